@@ -1,0 +1,316 @@
+!> The result file, which is the checkpoint too: it is complete but for the numbers from the start, every rank writes
+!> the points it has finished, the status of a point last, so that a run killed at any time can be continued.
+module spurflex_io_results
+   use hdf5, only: H5F_ACC_RDWR_F, H5P_FILE_ACCESS_F, h5fclose_f, h5fopen_f, h5pclose_f, h5pcreate_f, &
+      h5pset_fapl_mpio_f, hid_t
+   use mpi_f08, only: MPI_Comm, MPI_COMM_NULL, MPI_INFO_NULL, mpi_comm_rank, operator(==)
+   use spurflex_base_error, only: error_type, exit_mismatch, fatal_error
+   use spurflex_base_kinds, only: wp
+   use spurflex_external_file_lock, only: acquire_lock, file_lock, release_lock
+   use spurflex_external_posix, only: rename_file, sync_file
+   use spurflex_io_agreement, only: share_error
+   use spurflex_io_case, only: case_type, sweep_spec
+   use spurflex_io_hdf5, only: check, start_hdf5
+   use spurflex_io_provenance, only: provenance_type
+   use spurflex_io_results_check, only: check_file
+   use spurflex_io_results_create, only: create_file
+   use spurflex_io_results_layout, only: flexible_variables, rigid_variables
+   use spurflex_io_results_set, only: close_set, open_set, read_points, read_states, variable_set, write_points
+   use spurflex_measure_response, only: empty_response, nan, response, status_missing
+   implicit none
+   private
+
+   public :: results_file, create_results, open_results, close_results
+   public :: read_status, read_rigid, write_rigid, write_flexible
+
+   !> A result file that all ranks of a communicator have open.
+   type :: results_file
+      private
+      !> The ranks.
+      type(MPI_Comm) :: comm = MPI_COMM_NULL
+      !> Guard against another run on the same file, held by rank 0.
+      type(file_lock) :: lock
+      !> Open file.
+      integer(hid_t) :: file = -1_hid_t
+      !> Variables of the rigid support, on (speed); empty if it is not asked for.
+      type(variable_set) :: rigid
+      !> Variables of the flexible support, on (speed, stiffness); empty if it is not asked for.
+      type(variable_set) :: flexible
+   end type results_file
+
+contains
+
+   !> Make a new result file under another name, rename it, and open it on every rank. All ranks call this together.
+   subroutine create_results(results, case, comm, provenance, error)
+      !> The open file.
+      type(results_file), intent(out) :: results
+      !> What is computed.
+      type(case_type), intent(in) :: case
+      !> The ranks that write.
+      type(MPI_Comm), intent(in) :: comm
+      !> What computes it.
+      type(provenance_type), intent(in) :: provenance
+      !> Set on every rank if the file exists, another run has it, or it cannot be made.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer :: rank
+
+      call start_hdf5(error)
+      call share_error(comm, error)
+      if (allocated(error)) return
+      results%comm = comm
+      call mpi_comm_rank(comm, rank)
+      if (rank == 0) then
+         call acquire_lock(results%lock, lock_path(case), error)
+         if (.not. allocated(error)) call make_file(case%output%file, case, provenance, error)
+      end if
+      call open_shared(results, case%output%file, case%sweep, error)
+   end subroutine create_results
+
+   !> Open an existing result file on every rank to continue it. All ranks call this together.
+   subroutine open_results(results, case, comm, error)
+      !> The open file.
+      type(results_file), intent(out) :: results
+      !> What is computed.
+      type(case_type), intent(in) :: case
+      !> The ranks that write.
+      type(MPI_Comm), intent(in) :: comm
+      !> Set on every rank, with `exit_mismatch` and what differs if the file belongs to another deck or version.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer :: rank
+
+      call start_hdf5(error)
+      call share_error(comm, error)
+      if (allocated(error)) return
+      results%comm = comm
+      call mpi_comm_rank(comm, rank)
+      if (rank == 0) then
+         call acquire_lock(results%lock, lock_path(case), error)
+         if (.not. allocated(error)) call check_file(case%output%file, case, error)
+      end if
+      call open_shared(results, case%output%file, case%sweep, error)
+   end subroutine open_results
+
+   !> Close the file and remove its lock; does nothing if it is not open. All ranks call this together.
+   subroutine close_results(results, error)
+      !> The open file.
+      type(results_file), intent(inout) :: results
+      !> Set on every rank if a rank cannot close.
+      type(error_type), allocatable, intent(out) :: error
+
+      type(error_type), allocatable :: next
+      integer :: ierr
+
+      if (results%comm == MPI_COMM_NULL) return
+      call close_set(results%rigid, error)
+      call close_set(results%flexible, next)
+      call keep_first(error, next)
+      if (results%file >= 0) then
+         call h5fclose_f(results%file, ierr)
+         call check(ierr, 'close the result file', error)
+         results%file = -1_hid_t
+      end if
+      call share_error(results%comm, error)
+      ! Every rank has closed: the file is free.
+      call release_lock(results%lock, next)
+      call keep_first(error, next)
+      call share_error(results%comm, error)
+      results%comm = MPI_COMM_NULL
+   end subroutine close_results
+
+   !> Read which points have been computed. Each rank reads for itself.
+   subroutine read_status(results, rigid_status, flexible_status, error)
+      !> The open file.
+      type(results_file), intent(in) :: results
+      !> Status on the rigid support, shape (speed), or any shape if it is not asked for.
+      integer, intent(out) :: rigid_status(:)
+      !> Status on the flexible support, shape (speed, stiffness), or any shape if it is not asked for.
+      integer, intent(out) :: flexible_status(:, :)
+      !> Set if it cannot be read.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer :: rigid_states(size(rigid_status)), flexible_states(size(flexible_status))
+
+      rigid_status = status_missing
+      flexible_status = status_missing
+      if (size(results%rigid%variables) > 0) then
+         call require(all(shape(rigid_status) == results%rigid%extents), error)
+         if (allocated(error)) return
+         call read_states(results%rigid, rigid_states, error)
+         if (allocated(error)) return
+         rigid_status = rigid_states
+      end if
+      if (size(results%flexible%variables) > 0) then
+         call require(all(shape(flexible_status) == results%flexible%extents), error)
+         if (allocated(error)) return
+         call read_states(results%flexible, flexible_states, error)
+         if (allocated(error)) return
+         flexible_status = reshape(flexible_states, shape(flexible_status))
+      end if
+   end subroutine read_status
+
+   !> Read the responses on the rigid support. Each rank reads for itself.
+   subroutine read_rigid(results, responses, error)
+      !> The open file.
+      type(results_file), intent(in) :: results
+      !> The responses, shape (speed); empty responses where there are none yet.
+      type(response), intent(out) :: responses(:)
+      !> Set if they cannot be read.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer :: i
+
+      do i = 1, size(responses)
+         responses(i) = empty_response()
+      end do
+      if (size(results%rigid%variables) == 0) return
+      call require(all(shape(responses) == results%rigid%extents), error)
+      if (allocated(error)) return
+      call read_points(results%rigid, responses, error)
+   end subroutine read_rigid
+
+   !> Write responses on the rigid support. Each rank writes for itself.
+   subroutine write_rigid(results, first_speed, responses, error)
+      !> The open file.
+      type(results_file), intent(in) :: results
+      !> Index of the first speed, from 1.
+      integer, intent(in) :: first_speed
+      !> Responses at consecutive speeds, shape (points).
+      type(response), intent(in) :: responses(:)
+      !> Set if they cannot be written.
+      type(error_type), allocatable, intent(out) :: error
+
+      real(wp) :: eta(2, size(responses))
+
+      eta = nan()
+      call require(size(results%rigid%variables) > 0, error)
+      if (.not. allocated(error)) call write_points(results%rigid, [first_speed], responses, eta, error)
+   end subroutine write_rigid
+
+   !> Write responses on the flexible support. Each rank writes for itself.
+   subroutine write_flexible(results, stiffness_index, first_speed, responses, eta, error)
+      !> The open file.
+      type(results_file), intent(in) :: results
+      !> Index of the support stiffness, from 1.
+      integer, intent(in) :: stiffness_index
+      !> Index of the first speed, from 1.
+      integer, intent(in) :: first_speed
+      !> Responses at consecutive speeds, shape (points).
+      type(response), intent(in) :: responses(:)
+      !> Change of each bearing's largest deformation by the flexible support [percent], shape (2, points);
+      !> not written if the rigid support is not asked for, NaN if absent.
+      real(wp), intent(in), optional :: eta(:, :)
+      !> Set if they cannot be written.
+      type(error_type), allocatable, intent(out) :: error
+
+      real(wp) :: known_eta(2, size(responses))
+
+      known_eta = nan()
+      if (present(eta)) known_eta = eta
+      call require(size(results%flexible%variables) > 0, error)
+      if (allocated(error)) return
+      call write_points(results%flexible, [first_speed, stiffness_index], responses, known_eta, error)
+   end subroutine write_flexible
+
+   !> Make the file under another name, so that what has the final name is always whole.
+   subroutine make_file(path, case, provenance, error)
+      !> Path of the file.
+      character(len=*), intent(in) :: path
+      !> What is computed.
+      type(case_type), intent(in) :: case
+      !> What computes it.
+      type(provenance_type), intent(in) :: provenance
+      !> Set if the file exists or cannot be made.
+      type(error_type), allocatable, intent(out) :: error
+
+      logical :: exists
+
+      inquire (file=path, exist=exists)
+      if (exists) then
+         call fatal_error(error, "the result file '"//path//"' exists already", exit_mismatch)
+         return
+      end if
+      call create_file(path//'.part', case, provenance, error)
+      if (allocated(error)) return
+      call sync_file(path//'.part', error)
+      if (allocated(error)) return
+      call rename_file(path//'.part', path, error)
+   end subroutine make_file
+
+   !> Open the file on every rank, unless rank 0 found that it should not be; then leave nothing open and no lock.
+   subroutine open_shared(results, path, sweep, error)
+      !> The file, with its communicator.
+      type(results_file), intent(inout) :: results
+      !> Path of the file.
+      character(len=*), intent(in) :: path
+      !> Grid asked for.
+      type(sweep_spec), intent(in) :: sweep
+      !> This rank's error before, the common error after.
+      type(error_type), allocatable, intent(inout) :: error
+
+      type(error_type), allocatable :: next
+      integer(hid_t) :: access
+      integer :: ierr(4)
+
+      call share_error(results%comm, error)
+      if (.not. allocated(error)) then
+         call h5pcreate_f(H5P_FILE_ACCESS_F, access, ierr(1))
+         call h5pset_fapl_mpio_f(access, results%comm%MPI_VAL, MPI_INFO_NULL%MPI_VAL, ierr(2))
+         call h5fopen_f(path, H5F_ACC_RDWR_F, results%file, ierr(3), access_prp=access)
+         call h5pclose_f(access, ierr(4))
+         call check(minval(ierr), "open '"//path//"' for writing on every rank", error)
+         if (allocated(error)) results%file = -1_hid_t
+         call share_error(results%comm, error)
+      end if
+      if (.not. allocated(error)) then
+         call open_set(results%rigid, results%file, rigid_variables(sweep), [sweep%speed_count], error)
+         if (.not. allocated(error)) then
+            call open_set(results%flexible, results%file, flexible_variables(sweep), &
+               [sweep%speed_count, sweep%stiffness_count], error)
+         end if
+         if (allocated(error)) then
+            error%code = exit_mismatch
+            error%message = "the result file '"//path//"' is damaged: "//error%message
+         end if
+         call share_error(results%comm, error)
+      end if
+      if (allocated(error)) call close_results(results, next)
+   end subroutine open_shared
+
+   !> Refuse a call that does not fit the grid.
+   pure subroutine require(fits, error)
+      !> The call fits.
+      logical, intent(in) :: fits
+      !> Set if it does not.
+      type(error_type), allocatable, intent(inout) :: error
+
+      if (.not. fits) call fatal_error(error, 'the points do not fit the grid of the result file')
+   end subroutine require
+
+   !> Keep the first of two errors.
+   pure subroutine keep_first(error, next)
+      !> The error so far.
+      type(error_type), allocatable, intent(inout) :: error
+      !> Another, gone afterwards.
+      type(error_type), allocatable, intent(inout) :: next
+
+      if (.not. allocated(next)) return
+      if (allocated(error)) then
+         deallocate (next)
+      else
+         call move_alloc(next, error)
+      end if
+   end subroutine keep_first
+
+   !> Path of the lock file.
+   pure function lock_path(case) result(path)
+      !> What is computed.
+      type(case_type), intent(in) :: case
+      !> The path.
+      character(len=:), allocatable :: path
+
+      path = case%output%file//'.lock'
+   end function lock_path
+
+end module spurflex_io_results

@@ -1,0 +1,225 @@
+!> Makes the result file, complete but for the numbers, in one process.
+module spurflex_io_results_create
+   use hdf5, only: H5F_ACC_TRUNC_F, H5F_SCOPE_GLOBAL_F, H5T_NATIVE_DOUBLE, h5dclose_f, h5dwrite_f, h5fclose_f, &
+      h5fcreate_f, h5fflush_f, h5gclose_f, h5gcreate_f, hid_t, hsize_t
+   use spurflex_base_error, only: error_type
+   use spurflex_io_case, only: case_type
+   use spurflex_io_hdf5, only: attach_scale, check, create_dataset, make_scale
+   use spurflex_io_hdf5_text, only: write_attribute, write_text
+   use spurflex_io_provenance, only: provenance_type
+   use spurflex_io_results_layout, only: axes_of, axis_type, flags_of, flexible_variables, real_value, &
+      rigid_variables, variable_type
+   implicit none
+   private
+
+   public :: create_file
+   public :: provenance_group, deck_name, version_name
+
+   !> Group that says where the file comes from.
+   character(len=*), parameter :: provenance_group = 'provenance'
+   !> Text in it: the resolved deck.
+   character(len=*), parameter :: deck_name = 'resolved_deck'
+   !> Text in it: the version of the program.
+   character(len=*), parameter :: version_name = 'version'
+   !> Metadata conventions that the attributes follow.
+   character(len=*), parameter :: conventions = 'CF-1.10'
+
+contains
+
+   !> Make the file with every axis, variable and attribute, flush and close it.
+   subroutine create_file(path, case, provenance, error)
+      !> Path of the file; replaced if it exists.
+      character(len=*), intent(in) :: path
+      !> What is computed.
+      type(case_type), intent(in) :: case
+      !> What computes it.
+      type(provenance_type), intent(in) :: provenance
+      !> Set if the file cannot be made.
+      type(error_type), allocatable, intent(out) :: error
+
+      type(error_type), allocatable :: close_error
+      integer(hid_t) :: file
+      integer :: ierr
+
+      call h5fcreate_f(path, H5F_ACC_TRUNC_F, file, ierr)
+      call check(ierr, "make the file '"//path//"'", error)
+      if (allocated(error)) return
+      call fill_file(file, case, provenance, error)
+      if (.not. allocated(error)) then
+         call h5fflush_f(file, H5F_SCOPE_GLOBAL_F, ierr)
+         call check(ierr, "flush '"//path//"'", error)
+      end if
+      call h5fclose_f(file, ierr)
+      call check(ierr, "close '"//path//"'", close_error)
+      if (allocated(close_error) .and. .not. allocated(error)) call move_alloc(close_error, error)
+   end subroutine create_file
+
+   !> Write everything that a new file holds.
+   subroutine fill_file(file, case, provenance, error)
+      !> Open file.
+      integer(hid_t), intent(in) :: file
+      !> What is computed.
+      type(case_type), intent(in) :: case
+      !> What computes it.
+      type(provenance_type), intent(in) :: provenance
+      !> Set if the file cannot be written.
+      type(error_type), allocatable, intent(out) :: error
+
+      type(axis_type), allocatable :: axes(:)
+      type(variable_type), allocatable :: variables(:)
+      integer(hid_t), allocatable :: scales(:)
+      integer :: i, ierr
+
+      call write_attribute(file, 'Conventions', conventions, error)
+      if (allocated(error)) return
+      call write_attribute(file, 'title', trim(case%title), error)
+      if (allocated(error)) return
+      call write_attribute(file, 'spurflex_version', provenance%version, error)
+      if (allocated(error)) return
+      call write_provenance(file, case%resolved, provenance, error)
+      if (allocated(error)) return
+
+      axes = axes_of(case%sweep)
+      allocate (scales(size(axes)))
+      do i = 1, size(axes)
+         call create_axis(file, axes(i), scales(i), error)
+         if (allocated(error)) return
+      end do
+      allocate (variables, source=[flexible_variables(case%sweep), rigid_variables(case%sweep)])
+      do i = 1, size(variables)
+         call create_variable(file, variables(i), axes, scales, error)
+         if (allocated(error)) return
+      end do
+      do i = 1, size(scales)
+         call h5dclose_f(scales(i), ierr)
+         call check(ierr, "close the axis '"//trim(axes(i)%name)//"'", error)
+      end do
+   end subroutine fill_file
+
+   !> Write the group that says where the file comes from.
+   subroutine write_provenance(file, resolved, provenance, error)
+      !> Open file.
+      integer(hid_t), intent(in) :: file
+      !> The resolved deck.
+      character(len=*), intent(in) :: resolved
+      !> What computes it.
+      type(provenance_type), intent(in) :: provenance
+      !> Set if it cannot be written.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer(hid_t) :: group
+      integer :: ierr
+
+      call h5gcreate_f(file, provenance_group, group, ierr)
+      call check(ierr, "make the group '"//provenance_group//"'", error)
+      if (.not. allocated(error)) call write_text(group, deck_name, resolved, error)
+      if (.not. allocated(error)) call write_text(group, version_name, provenance%version, error)
+      if (.not. allocated(error)) call write_text(group, 'commit', provenance%commit, error)
+      if (.not. allocated(error)) call write_text(group, 'compiler', provenance%compiler, error)
+      if (.not. allocated(error)) call write_text(group, 'flags', provenance%flags, error)
+      if (.not. allocated(error)) call write_text(group, 'mpi', provenance%mpi, error)
+      if (.not. allocated(error)) call write_text(group, 'hdf5', provenance%hdf5, error)
+      if (.not. allocated(error)) call write_text(group, 'date', provenance%date, error)
+      if (allocated(error)) return
+      call h5gclose_f(group, ierr)
+      call check(ierr, "close the group '"//provenance_group//"'", error)
+   end subroutine write_provenance
+
+   !> Make an axis with its values.
+   subroutine create_axis(file, axis, scale, error)
+      !> Open file.
+      integer(hid_t), intent(in) :: file
+      !> The axis.
+      type(axis_type), intent(in) :: axis
+      !> Its open scale.
+      integer(hid_t), intent(out) :: scale
+      !> Set if it cannot be made.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer(hsize_t) :: extents(1)
+      integer :: ierr
+
+      call create_dataset(file, trim(axis%name), shape(axis%values), .true., scale, error)
+      if (allocated(error)) return
+      extents = size(axis%values, kind=hsize_t)
+      call h5dwrite_f(scale, H5T_NATIVE_DOUBLE, axis%values, extents, ierr)
+      call check(ierr, "write the axis '"//trim(axis%name)//"'", error)
+      if (allocated(error)) return
+      call make_scale(scale, trim(axis%name), error)
+      if (allocated(error)) return
+      call describe(scale, axis%units, axis%long_name, error)
+   end subroutine create_axis
+
+   !> Make a variable, without values.
+   subroutine create_variable(file, variable, axes, scales, error)
+      !> Open file.
+      integer(hid_t), intent(in) :: file
+      !> The variable.
+      type(variable_type), intent(in) :: variable
+      !> Axes of the file, shape (axes).
+      type(axis_type), intent(in) :: axes(:)
+      !> Their open scales, shape (axes).
+      integer(hid_t), intent(in) :: scales(:)
+      !> Set if it cannot be made.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer :: chosen(count(variable%axes /= '')), extents(count(variable%axes /= ''))
+      integer, allocatable :: flag_values(:)
+      character(len=:), allocatable :: flag_meanings
+      integer(hid_t) :: dataset
+      integer :: i, ierr
+
+      do i = 1, size(chosen)
+         chosen(i) = position_of(variable%axes(i), axes)
+         extents(i) = size(axes(chosen(i))%values)
+      end do
+      call create_dataset(file, trim(variable%name), extents, variable%kind == real_value, dataset, error)
+      if (allocated(error)) return
+      do i = 1, size(chosen)
+         call attach_scale(dataset, scales(chosen(i)), i, size(chosen), error)
+         if (allocated(error)) return
+      end do
+      call describe(dataset, variable%units, variable%long_name, error)
+      if (allocated(error)) return
+      call flags_of(variable%kind, flag_values, flag_meanings)
+      if (size(flag_values) > 0) then
+         call write_attribute(dataset, 'flag_values', flag_values, error)
+         if (allocated(error)) return
+         call write_attribute(dataset, 'flag_meanings', flag_meanings, error)
+         if (allocated(error)) return
+      end if
+      call h5dclose_f(dataset, ierr)
+      call check(ierr, "close the variable '"//trim(variable%name)//"'", error)
+   end subroutine create_variable
+
+   !> Write unit and description.
+   subroutine describe(dataset, units, long_name, error)
+      !> Open dataset.
+      integer(hid_t), intent(in) :: dataset
+      !> Unit.
+      character(len=*), intent(in) :: units
+      !> Description for people.
+      character(len=*), intent(in) :: long_name
+      !> Set if they cannot be written.
+      type(error_type), allocatable, intent(out) :: error
+
+      call write_attribute(dataset, 'units', trim(units), error)
+      if (allocated(error)) return
+      call write_attribute(dataset, 'long_name', trim(long_name), error)
+   end subroutine describe
+
+   !> Where an axis is among the axes of the file.
+   pure function position_of(name, axes) result(position)
+      !> Name of the axis, which must be there.
+      character(len=*), intent(in) :: name
+      !> Axes of the file, shape (axes).
+      type(axis_type), intent(in) :: axes(:)
+      !> Its position.
+      integer :: position
+
+      do position = 1, size(axes)
+         if (axes(position)%name == name) return
+      end do
+   end function position_of
+
+end module spurflex_io_results_create

@@ -1,0 +1,267 @@
+!> The variables and axes of a result file. This table drives creating, writing and reading.
+!>
+!> To add a variable of one number per point: give `response` a component, `quantities` a line,
+!> and `get_values` and `set_values` a case of the same name. An axis is one more entry in `axes_of`.
+module spurflex_io_results_layout
+   use spurflex_base_kinds, only: wp
+   use spurflex_io_axes, only: speeds, stiffnesses
+   use spurflex_io_case, only: sweep_spec
+   use spurflex_measure_response, only: contact_both_flanks, contact_kept, contact_lost, motion_chaotic, &
+      motion_quasi_periodic, motion_unresolved, response, status_diverged, status_missing, status_not_settled, &
+      status_settled
+   implicit none
+   private
+
+   public :: axis_type, variable_type
+   public :: axes_of, flags_of, rigid_variables, flexible_variables, get_values, set_values
+   public :: real_value, name_length, units_length, long_name_length
+
+   !> Longest name of a variable.
+   integer, parameter :: name_length = 40
+   !> Longest unit.
+   integer, parameter :: units_length = 8
+   !> Longest description.
+   integer, parameter :: long_name_length = 80
+   !> Most dimensions of a variable.
+   integer, parameter :: most_dimensions = 2
+
+   !> What a variable holds: reals, plain integers, or one of the sets of flags.
+   integer, parameter :: real_value = 0, plain_integer = 1, motion_flag = 2, status_flag = 3, contact_flag = 4
+
+   character(len=*), parameter :: speed_axis = 'speed', stiffness_axis = 'support_stiffness', rigid_prefix = 'rigid_'
+
+   !> An axis of the grid.
+   type :: axis_type
+      !> Name of the dimension and of its scale.
+      character(len=name_length) :: name
+      !> Unit of the values.
+      character(len=units_length) :: units
+      !> Description for people.
+      character(len=long_name_length) :: long_name
+      !> Values along the axis.
+      real(wp), allocatable :: values(:)
+   end type axis_type
+
+   !> A quantity that is known at every point.
+   type :: quantity_type
+      !> Name, without a prefix.
+      character(len=name_length) :: name
+      !> Unit, `1` for a number without.
+      character(len=units_length) :: units
+      !> What the numbers are (`real_value` ...).
+      integer :: kind
+      !> Needs both the rigid and the flexible support.
+      logical :: compares
+      !> Description for people.
+      character(len=long_name_length) :: long_name
+   end type quantity_type
+
+   !> A variable of the file.
+   type :: variable_type
+      !> Name in the file.
+      character(len=name_length) :: name
+      !> Name of the quantity in it, by which its values are found.
+      character(len=name_length) :: quantity
+      !> Unit, `1` for a number without.
+      character(len=units_length) :: units
+      !> Description for people.
+      character(len=long_name_length) :: long_name
+      !> What the numbers are (`real_value` ...).
+      integer :: kind
+      !> Names of its axes, fastest first, blank where unused.
+      character(len=name_length) :: axes(most_dimensions)
+   end type variable_type
+
+   !> Every quantity, in the order of writing: the status goes last, as it says that the others are there.
+   type(quantity_type), parameter :: quantities(*) = [ &
+      quantity_type('y1_amplitude', 'm', real_value, .false., 'half the peak-to-peak of the driving gear in y'), &
+      quantity_type('y1_rms', 'm', real_value, .false., 'root mean square of y1 about its mean'), &
+      quantity_type('y1_max', 'm', real_value, .false., 'largest displacement of the driving gear in y'), &
+      quantity_type('y1_min', 'm', real_value, .false., 'smallest displacement of the driving gear in y'), &
+      quantity_type('bearing1_deformation_max', 'm', real_value, .false., 'largest deformation of the driving bearing'), &
+      quantity_type('bearing2_deformation_max', 'm', real_value, .false., 'largest deformation of the driven bearing'), &
+      quantity_type('eta1', 'percent', real_value, .true., 'change of bearing1_deformation_max by the flexible support'), &
+      quantity_type('eta2', 'percent', real_value, .true., 'change of bearing2_deformation_max by the flexible support'), &
+      quantity_type('error_estimate', '1', real_value, .false., 'estimated relative error of y1_amplitude'), &
+      quantity_type('motion', '1', motion_flag, .false., 'class of the steady motion'), &
+      quantity_type('periods_integrated', '1', plain_integer, .false., 'mesh periods integrated'), &
+      quantity_type('contact', '1', contact_flag, .false., 'contact of the teeth'), &
+      quantity_type('status', '1', status_flag, .false., 'state of the computation')]
+
+contains
+
+   !> The axes of the file.
+   pure function axes_of(sweep) result(axes)
+      !> Grid asked for.
+      type(sweep_spec), intent(in) :: sweep
+      !> The axes, shape (axes).
+      type(axis_type), allocatable :: axes(:)
+
+      axes = [axis_type(speed_axis, 'rpm', 'rotating speed of the driving gear', speeds(sweep))]
+      if (sweep%flexible) then
+         axes = [axes, axis_type(stiffness_axis, 'N/m', 'stiffness of the gearbox support in x and y', stiffnesses(sweep))]
+      end if
+   end function axes_of
+
+   !> The variables of the rigid support, on (speed), in the order of writing.
+   pure function rigid_variables(sweep) result(variables)
+      !> Grid asked for.
+      type(sweep_spec), intent(in) :: sweep
+      !> The variables, shape (variables); none if the rigid support is not asked for.
+      type(variable_type), allocatable :: variables(:)
+
+      character(len=name_length) :: axes(most_dimensions)
+
+      axes = [character(len=name_length) :: speed_axis, '']
+      variables = variables_of(pack(quantities, sweep%rigid .and. .not. quantities%compares), rigid_prefix, &
+         'rigid support: ', axes)
+   end function rigid_variables
+
+   !> The variables of the flexible support, on (support_stiffness, speed) in C order, in the order of writing.
+   pure function flexible_variables(sweep) result(variables)
+      !> Grid asked for.
+      type(sweep_spec), intent(in) :: sweep
+      !> The variables, shape (variables); none if the flexible support is not asked for.
+      type(variable_type), allocatable :: variables(:)
+
+      character(len=name_length) :: axes(most_dimensions)
+
+      axes = [character(len=name_length) :: speed_axis, stiffness_axis]
+      variables = variables_of(pack(quantities, sweep%flexible .and. (sweep%rigid .or. .not. quantities%compares)), &
+         '', '', axes)
+   end function flexible_variables
+
+   !> Variables for quantities.
+   pure function variables_of(chosen, prefix, description, axes) result(variables)
+      !> The quantities, shape (variables).
+      type(quantity_type), intent(in) :: chosen(:)
+      !> Prefix of the names.
+      character(len=*), intent(in) :: prefix
+      !> Prefix of the descriptions.
+      character(len=*), intent(in) :: description
+      !> Names of the axes, fastest first.
+      character(len=name_length), intent(in) :: axes(most_dimensions)
+      !> The variables, shape (variables).
+      type(variable_type) :: variables(size(chosen))
+
+      integer :: i
+
+      do i = 1, size(chosen)
+         variables(i)%name = prefix//chosen(i)%name
+         variables(i)%quantity = chosen(i)%name
+         variables(i)%units = chosen(i)%units
+         variables(i)%long_name = description//chosen(i)%long_name
+         variables(i)%kind = chosen(i)%kind
+         variables(i)%axes = axes
+      end do
+   end function variables_of
+
+   !> The flags of an integer variable, as CF has them.
+   pure subroutine flags_of(kind, values, meanings)
+      !> What the numbers are (`real_value` ...).
+      integer, intent(in) :: kind
+      !> Values that occur, shape (flags); none if they are no flags.
+      integer, allocatable, intent(out) :: values(:)
+      !> One word for each, separated by blanks.
+      character(len=:), allocatable, intent(out) :: meanings
+
+      integer :: i
+
+      select case (kind)
+      case (motion_flag)
+         values = [motion_unresolved, (i, i=1, 8), motion_quasi_periodic, motion_chaotic]
+         meanings = 'unresolved period_1 period_2 period_3 period_4 period_5 period_6 period_7 period_8 ' &
+            //'quasi_periodic chaotic'
+      case (status_flag)
+         values = [status_missing, status_settled, status_not_settled, status_diverged]
+         meanings = 'missing settled not_settled diverged'
+      case (contact_flag)
+         values = [contact_kept, contact_lost, contact_both_flanks]
+         meanings = 'never_lost lost both_flanks'
+      case default
+         values = [integer ::]
+         meanings = ''
+      end select
+   end subroutine flags_of
+
+   !> The values of a quantity, out of responses.
+   pure subroutine get_values(quantity, responses, eta, reals, integers)
+      !> Name of the quantity.
+      character(len=*), intent(in) :: quantity
+      !> Responses, shape (points).
+      type(response), intent(in) :: responses(:)
+      !> Changes by the flexible support [percent], shape (2, points).
+      real(wp), intent(in) :: eta(:, :)
+      !> Values of a real quantity, shape (points); else left alone.
+      real(wp), intent(inout) :: reals(:)
+      !> Values of an integer quantity, shape (points); else left alone.
+      integer, intent(inout) :: integers(:)
+
+      select case (quantity)
+      case ('y1_amplitude')
+         reals = responses%y1_amplitude
+      case ('y1_rms')
+         reals = responses%y1_rms
+      case ('y1_max')
+         reals = responses%y1_max
+      case ('y1_min')
+         reals = responses%y1_min
+      case ('bearing1_deformation_max')
+         reals = responses%bearing_deformation_max(1)
+      case ('bearing2_deformation_max')
+         reals = responses%bearing_deformation_max(2)
+      case ('eta1')
+         reals = eta(1, :)
+      case ('eta2')
+         reals = eta(2, :)
+      case ('error_estimate')
+         reals = responses%error_estimate
+      case ('motion')
+         integers = responses%motion
+      case ('periods_integrated')
+         integers = responses%periods_integrated
+      case ('contact')
+         integers = responses%contact
+      case ('status')
+         integers = responses%status
+      end select
+   end subroutine get_values
+
+   !> Put the values of a quantity into responses; quantities that compare belong to no response.
+   pure subroutine set_values(quantity, responses, reals, integers)
+      !> Name of the quantity.
+      character(len=*), intent(in) :: quantity
+      !> Responses, shape (points).
+      type(response), intent(inout) :: responses(:)
+      !> Values of a real quantity, shape (points).
+      real(wp), intent(in) :: reals(:)
+      !> Values of an integer quantity, shape (points).
+      integer, intent(in) :: integers(:)
+
+      select case (quantity)
+      case ('y1_amplitude')
+         responses%y1_amplitude = reals
+      case ('y1_rms')
+         responses%y1_rms = reals
+      case ('y1_max')
+         responses%y1_max = reals
+      case ('y1_min')
+         responses%y1_min = reals
+      case ('bearing1_deformation_max')
+         responses%bearing_deformation_max(1) = reals
+      case ('bearing2_deformation_max')
+         responses%bearing_deformation_max(2) = reals
+      case ('error_estimate')
+         responses%error_estimate = reals
+      case ('motion')
+         responses%motion = integers
+      case ('periods_integrated')
+         responses%periods_integrated = integers
+      case ('contact')
+         responses%contact = integers
+      case ('status')
+         responses%status = integers
+      end select
+   end subroutine set_values
+
+end module spurflex_io_results_layout
