@@ -1,0 +1,122 @@
+!> What the program says while it runs: one logger, lines to standard output, from rank 0 only.
+module spurflex_io_log
+   use, intrinsic :: iso_fortran_env, only: output_unit, error_unit
+   use spurflex_base_kinds, only: wp, i8
+   use spurflex_base_text, only: to_text, fixed_text
+   implicit none
+   private
+
+   public :: logger, new_logger
+
+   !> Seconds between progress lines.
+   real(wp), parameter :: progress_interval = 5.0_wp
+
+   !> Where lines go and when the next progress line is due.
+   type :: logger
+      private
+      !> This logger writes.
+      logical :: active = .false.
+      !> Tick of the clock at the start, and ticks per second.
+      integer(i8) :: start = 0_i8, rate = 1_i8
+      !> Elapsed seconds at the last progress line and at the start of the phase.
+      real(wp) :: last = 0.0_wp, phase_start = 0.0_wp
+   contains
+      !> Say something.
+      procedure :: say
+      !> Say what is wrong, on standard error.
+      procedure :: complain
+      !> Begin a phase of work.
+      procedure :: begin
+      !> Say how far the phase is, if it is time to.
+      procedure :: progress
+      !> Seconds since the logger was made.
+      procedure :: elapsed
+   end type logger
+
+contains
+
+   !> A logger that starts its clock now.
+   function new_logger(active) result(self)
+      !> It writes; false on every rank but one.
+      logical, intent(in) :: active
+      !> The logger.
+      type(logger) :: self
+
+      self%active = active
+      call system_clock(self%start, self%rate)
+   end function new_logger
+
+   !> Seconds since the logger was made.
+   function elapsed(self) result(seconds)
+      !> Logger.
+      class(logger), intent(in) :: self
+      !> Seconds.
+      real(wp) :: seconds
+
+      integer(i8) :: now
+
+      call system_clock(now)
+      seconds = real(now - self%start, wp)/real(self%rate, wp)
+   end function elapsed
+
+   !> Say something.
+   subroutine say(self, text)
+      !> Logger.
+      class(logger), intent(in) :: self
+      !> One or more lines.
+      character(len=*), intent(in) :: text
+
+      if (.not. self%active) return
+      write (output_unit, '(a)') text
+      flush (output_unit)
+   end subroutine say
+
+   !> Say what is wrong, on standard error, from whichever rank.
+   subroutine complain(self, text)
+      !> Logger.
+      class(logger), intent(in) :: self
+      !> One or more lines.
+      character(len=*), intent(in) :: text
+
+      if (self%rate == 0_i8) return
+      write (error_unit, '(a)') text
+      flush (error_unit)
+   end subroutine complain
+
+   !> Begin a phase of work.
+   subroutine begin(self, text)
+      !> Logger.
+      class(logger), intent(inout) :: self
+      !> What begins.
+      character(len=*), intent(in) :: text
+
+      self%phase_start = self%elapsed()
+      self%last = self%phase_start
+      call self%say(text)
+   end subroutine begin
+
+   !> Say how far the phase is, if the last time is long enough ago.
+   subroutine progress(self, done, total, remark)
+      !> Logger.
+      class(logger), intent(inout) :: self
+      !> Points done and points in all.
+      integer(i8), intent(in) :: done, total
+      !> What came out so far.
+      character(len=*), intent(in) :: remark
+
+      real(wp) :: now, spent
+      character(len=:), allocatable :: left
+
+      if (.not. self%active) return
+      now = self%elapsed()
+      if (now - self%last < progress_interval) return
+      self%last = now
+      spent = now - self%phase_start
+      left = 'unknown'
+      if (done > 0_i8) left = fixed_text(spent*real(total - done, wp)/real(done, wp), 0)//' s'
+      call self%say('  '//to_text(done)//' of '//to_text(total)//' points ('// &
+                    fixed_text(100.0_wp*real(done, wp)/real(max(total, 1_i8), wp), 1)//' %), '//remark// &
+                    '; elapsed '//fixed_text(now, 0)//' s, remaining about '//left)
+   end subroutine progress
+
+end module spurflex_io_log

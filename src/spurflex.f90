@@ -1,0 +1,22 @@
+!> The library's front door: the public names that a program needs, from the layers where they live.
+module spurflex
+   use spurflex_base_error, only: error_type, exit_complete
+   use spurflex_external_process, only: exit_process
+   use spurflex_io_case, only: case_type
+   use spurflex_io_command_line, only: action_check, action_help, action_keys, action_run, action_version, command_type, &
+      parse_command_line, usage
+   use spurflex_io_log, only: logger, new_logger
+   use spurflex_io_provenance, only: version_text
+   use spurflex_io_reference, only: key_reference
+   use spurflex_sweep_driver, only: run_case, share_case
+   use spurflex_sweep_plan, only: describe_plan
+   implicit none
+   private
+
+   public :: error_type, exit_complete, exit_process
+   public :: case_type, share_case, describe_plan, run_case
+   public :: command_type, parse_command_line, usage
+   public :: action_check, action_help, action_keys, action_run, action_version
+   public :: logger, new_logger, version_text, key_reference
+
+end module spurflex

@@ -1,0 +1,166 @@
+!> What has to be computed: the points of the grid that are missing, cut into chunks that are handed to ranks.
+!>
+!> A chunk is a run of neighbouring speeds on one row of the grid, so that its results are written in one piece. Soft
+!> supports, whose transients are long, come first: a slow chunk at the end would leave the other ranks idle. With the
+!> starts 'up' and 'down' each point begins where its neighbour ended, and a chunk is a whole row.
+module spurflex_sweep_plan
+   use spurflex_base_kinds, only: i8
+   use spurflex_base_text, only: to_text
+   use spurflex_integrate_options, only: start_rest, start_static, start_up, start_down
+   use spurflex_io_case, only: case_type
+   use spurflex_measure_response, only: status_missing
+   use spurflex_model_equations, only: rigid_dof, flexible_dof
+   implicit none
+   private
+
+   public :: chunk_type, plan_row, plan_grid, is_chained, describe_plan
+
+   !> Points handed out at once at most: few enough to balance, enough to write in one go.
+   integer, parameter :: largest_chunk = 32
+
+   !> Chunks that each rank should get at least, where there are enough points.
+   integer, parameter :: chunks_per_rank = 16
+
+   !> Neighbouring speeds of one row.
+   type :: chunk_type
+      !> Index of the support stiffness, 0 for the rigid support.
+      integer :: row = 0
+      !> Index of the first speed.
+      integer :: first = 1
+      !> Number of speeds.
+      integer :: count = 0
+   end type chunk_type
+
+contains
+
+   !> Each point begins where its neighbour ended.
+   pure function is_chained(case) result(chained)
+      !> Case.
+      type(case_type), intent(in) :: case
+      !> The start is 'up' or 'down'.
+      logical :: chained
+
+      chained = case%solver%start == start_up .or. case%solver%start == start_down
+   end function is_chained
+
+   !> Chunks of the missing points of the rigid support.
+   pure function plan_row(case, status, ranks) result(chunks)
+      !> Case.
+      type(case_type), intent(in) :: case
+      !> Status of each speed, shape (speed).
+      integer, intent(in) :: status(:)
+      !> Number of ranks.
+      integer, intent(in) :: ranks
+      !> The chunks, in the order in which they are handed out.
+      type(chunk_type), allocatable :: chunks(:)
+
+      chunks = cut_rows(case, reshape(status, [size(status), 1]), ranks)
+      chunks%row = 0
+   end function plan_row
+
+   !> Chunks of the missing points of the flexible support.
+   pure function plan_grid(case, status, ranks) result(chunks)
+      !> Case.
+      type(case_type), intent(in) :: case
+      !> Status of each point, shape (speed, stiffness).
+      integer, intent(in) :: status(:, :)
+      !> Number of ranks.
+      integer, intent(in) :: ranks
+      !> The chunks, in the order in which they are handed out: softest support first.
+      type(chunk_type), allocatable :: chunks(:)
+
+      chunks = cut_rows(case, status, ranks)
+   end function plan_grid
+
+   !> Cut the missing points of some rows into chunks.
+   pure function cut_rows(case, status, ranks) result(chunks)
+      !> Case.
+      type(case_type), intent(in) :: case
+      !> Status of each point, shape (speed, row).
+      integer, intent(in) :: status(:, :)
+      !> Number of ranks.
+      integer, intent(in) :: ranks
+      !> The chunks.
+      type(chunk_type), allocatable :: chunks(:)
+
+      type(chunk_type), allocatable :: found(:)
+      integer :: length, n, row, speed
+
+      length = max(1, min(largest_chunk, count(status == status_missing)/(ranks*chunks_per_rank)))
+      allocate (found(size(status)))
+      n = 0
+      do row = 1, size(status, 2)
+         if (is_chained(case)) then
+            if (all(status(:, row) /= status_missing)) cycle
+            n = n + 1
+            found(n) = chunk_type(row, 1, size(status, 1))
+         else
+            speed = 1
+            do while (speed <= size(status, 1))
+               if (status(speed, row) == status_missing) then
+                  n = n + 1
+                  found(n) = chunk_type(row, speed, missing_run(status(speed:, row), length))
+                  speed = speed + found(n)%count
+               else
+                  speed = speed + 1
+               end if
+            end do
+         end if
+      end do
+      chunks = found(:n)
+   end function cut_rows
+
+   !> How many points from the first on are missing.
+   pure function missing_run(status, most) result(length)
+      !> Status of neighbouring points, the first one missing.
+      integer, intent(in) :: status(:)
+      !> Count no further than this.
+      integer, intent(in) :: most
+      !> Number of points.
+      integer :: length
+
+      length = 1
+      do while (length < min(most, size(status)))
+         if (status(length + 1) /= status_missing) exit
+         length = length + 1
+      end do
+   end function missing_run
+
+   !> The grid and the planned work, for people.
+   pure function describe_plan(case) result(text)
+      !> Case.
+      type(case_type), intent(in) :: case
+      !> Several lines.
+      character(len=:), allocatable :: text
+
+      character(len=*), parameter :: newline = new_line('a')
+      character(len=:), allocatable :: start
+
+      associate (sweep => case%sweep)
+         text = 'speeds: '//to_text(sweep%speed_count)//' from '//to_text(sweep%speed_first)//' to ' &
+                //to_text(sweep%speed_last)//' rev/min'
+         if (sweep%flexible) text = text//newline//'support stiffnesses: '//to_text(sweep%stiffness_count)//' from ' &
+                                    //to_text(sweep%stiffness_first)//' to '//to_text(sweep%stiffness_last)//' N/m'
+         if (sweep%flexible) text = text//newline//'flexible support: ' &
+                                    //to_text(int(sweep%speed_count, i8)*sweep%stiffness_count)//' points, ' &
+                                    //to_text(flexible_dof)//' of 9 degrees of freedom integrated'
+         if (sweep%rigid) text = text//newline//'rigid support: '//to_text(sweep%speed_count)//' points, ' &
+                                 //to_text(rigid_dof)//' of 6 degrees of freedom integrated, once per speed'
+      end associate
+      if (.not. (case%sweep%rigid .and. case%sweep%flexible)) text = text//newline// &
+         'skipped: eta, which needs both supports'
+      select case (case%solver%start)
+      case (start_rest)
+         start = 'from rest, every point on its own'
+      case (start_static)
+         start = 'from the static equilibrium, every point on its own'
+      case (start_up)
+         start = 'from the next lower speed, row by row'
+      case default
+         start = 'from the next higher speed, row by row'
+      end select
+      text = text//newline//'start: '//start//newline//'steps: '//to_text(case%solver%steps_per_period) &
+             //' per mesh period, at most '//to_text(case%solver%max_periods)//' periods a point'
+   end function describe_plan
+
+end module spurflex_sweep_plan
