@@ -1,0 +1,78 @@
+"""What the literature reports for the figures drawn here."""
+
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+
+@dataclass(frozen=True)
+class PublishedCurve:
+    """Features of one published amplitude-frequency curve.
+
+    Attributes:
+        peaks: Speeds of the peaks [rev/min], ascending.
+        jumps: Speeds of the jumps [rev/min], ascending.
+    """
+
+    peaks: tuple[float, ...]
+    jumps: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class PublishedMap:
+    """Features of the published map of amplitude over speed and support stiffness.
+
+    Attributes:
+        crest: Speed of the crest of the soft support [rev/min].
+        crests_below: Speeds of the crests on the soft side of the crest line [rev/min].
+        crests_above: Speeds of the crests on its stiff side [rev/min].
+        flat: First and last speed where the stiffness hardly matters [rev/min].
+        irregular_above: Speed above which its effect is irregular [rev/min].
+    """
+
+    crest: float
+    crests_below: tuple[float, ...]
+    crests_above: tuple[float, ...]
+    flat: tuple[float, float]
+    irregular_above: float
+
+
+@cache
+def _table() -> dict[str, Any]:
+    """Parse the data file of the package."""
+    return tomllib.loads(files(__package__).joinpath("published.toml").read_text("utf-8"))
+
+
+def _speeds(values: list[float]) -> tuple[float, ...]:
+    """Turn a list of the data file into ascending floats."""
+    return tuple(sorted(float(value) for value in values))
+
+
+def published_curve(support: str) -> PublishedCurve:
+    """Return the published features of the amplitude-frequency curve.
+
+    Args:
+        support: 'rigid' or 'flexible'.
+
+    Returns:
+        Peaks and jumps.
+
+    Raises:
+        KeyError: For any other support.
+    """
+    curve = _table()["figure_2"][support]
+    return PublishedCurve(_speeds(curve["peaks"]), _speeds(curve["jumps"]))
+
+
+def published_map() -> PublishedMap:
+    """Return the published features of the map over speed and support stiffness."""
+    values = _table()["figure_9"]
+    return PublishedMap(
+        crest=float(values["crest"]),
+        crests_below=_speeds(values["crests_below"]),
+        crests_above=_speeds(values["crests_above"]),
+        flat=(float(values["flat"][0]), float(values["flat"][1])),
+        irregular_above=float(values["irregular_above"]),
+    )

@@ -1,0 +1,132 @@
+"""Opens a result file and masks the points without values."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from spurflex_postproc.flags import NO_VALUE, Status, has_value
+from spurflex_postproc.layout import SPEED, ResultError, check_file, one_line, plain_text
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """How many points of a grid are in which state."""
+
+    missing: int
+    settled: int
+    not_settled: int
+    diverged: int
+
+    @property
+    def total(self) -> int:
+        """Number of points of the grid."""
+        return self.missing + self.settled + self.not_settled + self.diverged
+
+    @property
+    def settled_fraction(self) -> float:
+        """Settled points as a fraction of all points; 0 for an empty grid."""
+        return self.settled / self.total if self.total else 0.0
+
+    def __str__(self) -> str:
+        return (
+            f"{100 * self.settled_fraction:.1f} % of {self.total} points settled"
+            f" ({self.not_settled} not settled, {self.missing} missing,"
+            f" {self.diverged} diverged)"
+        )
+
+
+def open_result(path: str | Path) -> xr.Dataset:
+    """Read a result file into memory.
+
+    Args:
+        path: The HDF5 file that a run wrote.
+
+    Returns:
+        The variables at the root of the file, on the dimensions `speed` [rev/min] and
+        `support_stiffness` [N/m]. Where a point is missing or diverged, reals are NaN and
+        integers are `NO_VALUE`; `status` and `rigid_status` stay as they are. The attribute
+        `path` names the file, `teeth_1` the teeth of the driving gear if the file tells.
+
+    Raises:
+        ResultError: If the file is missing, damaged, foreign or lacks required parts.
+    """
+    path = Path(path)
+    teeth = check_file(path)
+    try:
+        with xr.open_dataset(path, engine="h5netcdf", decode_cf=False) as lazy:
+            result = lazy.load()
+    except (OSError, RuntimeError, ValueError, KeyError) as cause:
+        raise ResultError(f"{path}: damaged: {one_line(cause)}") from cause
+    # Without decoding, dimension scales are plain variables on some versions of xarray.
+    result = result.set_coords([name for name in result.dims if name in result.variables])
+    for variable in result.variables.values():
+        variable.attrs = {key: plain_text(value) for key, value in variable.attrs.items()}
+    result = _masked(result)
+    result.attrs["path"] = str(path)
+    if teeth is not None:
+        result.attrs["teeth_1"] = teeth
+    return result
+
+
+def coverage(result: xr.Dataset, support: str) -> Coverage:
+    """Count the points of one support by status.
+
+    Args:
+        result: A dataset from `open_result`.
+        support: 'rigid' or 'flexible'.
+
+    Returns:
+        The counts.
+
+    Raises:
+        ResultError: If the file holds nothing on that support.
+    """
+    name = "rigid_status" if support == "rigid" else "status"
+    require(result, [name])
+    status = result[name].values
+    return Coverage(*(int(np.count_nonzero(status == flag)) for flag in Status))
+
+
+def require(result: xr.Dataset, names: Iterable[str]) -> None:
+    """Check that a dataset holds some variables.
+
+    Args:
+        result: A dataset from `open_result`.
+        names: The variables wanted.
+
+    Raises:
+        ResultError: Naming those that are absent and the run that would provide them.
+    """
+    absent = [name for name in names if name not in result]
+    if not absent:
+        return
+    hint = ""
+    if all(name.startswith("rigid_") for name in absent):
+        hint = " (run with support = 'both' or 'rigid')"
+    elif not any(name in result for name in ("status", "y1_amplitude")):
+        hint = " (run with support = 'both' or 'flexible')"
+    raise ResultError(f"{result.attrs.get('path', 'result')}: lacks {', '.join(absent)}{hint}")
+
+
+def _masked(result: xr.Dataset) -> xr.Dataset:
+    """Hide the values of points that are missing or diverged."""
+    for name in result.data_vars:
+        name = str(name)
+        if name in ("status", "rigid_status") or SPEED not in result[name].dims:
+            continue
+        flags = ["rigid_status"] if name.startswith("rigid_") else ["status"]
+        if name.startswith("eta"):
+            flags = ["status", "rigid_status"]
+        data = result[name]
+        if data.dtype.kind in "iub":
+            data = data.astype(np.int64)
+        blank = np.nan if data.dtype.kind == "f" else NO_VALUE
+        for flag in flags:
+            if flag in result:
+                shown = result[flag].copy(data=has_value(result[flag].values))
+                data = data.where(shown, blank).transpose(*result[name].dims)
+        result[name] = data.assign_attrs(result[name].attrs)
+    return result
