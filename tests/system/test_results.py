@@ -1,0 +1,360 @@
+"""The result file, through a test program that writes made-up numbers: labelled axes, identity at
+any number of ranks, refusal of files that do not fit, and what is left after a kill."""
+
+import os
+import shutil
+import subprocess
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+
+SPEEDS, STIFFNESSES = 5, 3
+TITLE = "Prüfung"
+DECK_ERROR, MISMATCH = 2, 3
+REALS = {
+    "y1_amplitude": "m",
+    "y1_rms": "m",
+    "y1_max": "m",
+    "y1_min": "m",
+    "bearing1_deformation_max": "m",
+    "bearing2_deformation_max": "m",
+    "error_estimate": "1",
+}
+FLAGS = ("motion", "status", "contact")
+COMMON = {*REALS, *FLAGS, "periods_integrated"}
+ETA = {"eta1", "eta2"}
+RIGID = {f"rigid_{name}" for name in COMMON}
+PROVENANCE = {
+    "resolved_deck",
+    "version",
+    "commit",
+    "compiler",
+    "flags",
+    "mpi",
+    "hdf5",
+    "date",
+}
+
+
+@pytest.fixture(scope="session")
+def driver():
+    """The test program."""
+    path = Path(os.environ.get("SPURFLEX_RESULTS_DRIVER", "results_driver"))
+    assert path.is_file(), f"{path} is not built"
+    return path
+
+
+@pytest.fixture
+def command(driver, mpiexec):
+    """Words of a run: command(mode, ranks=1, support='both', ...)."""
+
+    def words(
+        mode, *, ranks=1, support="both", speeds=SPEEDS, stiffnesses=STIFFNESSES, title=TITLE, file="map.h5"
+    ):
+        grid = [support, str(speeds), str(stiffnesses)]
+        return [*mpiexec, str(ranks), str(driver), mode, file, *grid, title]
+
+    return words
+
+
+@pytest.fixture
+def drive(command, tmp_path):
+    """Run the test program in an empty folder; expects exit code 0, or the one given."""
+
+    def run_driver(mode, *, code=0, environment=None, **options):
+        done = subprocess.run(
+            command(mode, **options),
+            cwd=tmp_path,
+            env={**os.environ, "SOURCE_DATE_EPOCH": "1700000000", **(environment or {})},
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+        if code is not None:
+            assert done.returncode == code, done.stdout + done.stderr
+        return done
+
+    return run_driver
+
+
+@pytest.mark.parametrize("engine", [None, "h5netcdf"])
+def test_axes_are_labelled_and_not_transposed(drive, tmp_path, engine):
+    drive("write", ranks=2)
+    with xarray.open_dataset(tmp_path / "map.h5", engine=engine) as data:
+        assert dict(data.sizes) == {"support_stiffness": STIFFNESSES, "speed": SPEEDS}
+        np.testing.assert_array_equal(data.speed, [1000.0, 2000.0, 3000.0, 4000.0, 5000.0])
+        np.testing.assert_array_equal(data.support_stiffness, [1e3, 1e5, 1e7])
+        assert data.speed.attrs["units"] == "rpm"
+        assert data.support_stiffness.attrs["units"] == "N/m"
+        assert set(data.data_vars) == COMMON | ETA | RIGID
+        for name in COMMON | ETA:
+            assert data[name].dims == ("support_stiffness", "speed")
+        for name in RIGID:
+            assert data[name].dims == ("speed",)
+
+        speed = np.arange(1, SPEEDS + 1)
+        place = speed + 1000.0 * np.arange(1, STIFFNESSES + 1)[:, None]
+        for prefix, where in (("", place), ("rigid_", 1.0 * speed)):
+            np.testing.assert_array_equal(data[f"{prefix}y1_amplitude"], where)
+            np.testing.assert_array_equal(data[f"{prefix}y1_rms"], where + 0.125)
+            np.testing.assert_array_equal(data[f"{prefix}y1_max"], where + 0.25)
+            np.testing.assert_array_equal(data[f"{prefix}y1_min"], -where)
+            np.testing.assert_array_equal(data[f"{prefix}bearing1_deformation_max"], where + 0.5)
+            np.testing.assert_array_equal(data[f"{prefix}bearing2_deformation_max"], where + 0.625)
+            np.testing.assert_array_equal(data[f"{prefix}error_estimate"], 1.0 / where)
+            np.testing.assert_array_equal(data[f"{prefix}periods_integrated"], where)
+            np.testing.assert_array_equal(data[f"{prefix}motion"], 1 + speed % 8 + 0 * where)
+            assert (data[f"{prefix}status"] == 1).all()
+            assert (data[f"{prefix}contact"] == 1).all()
+        np.testing.assert_array_equal(data.eta1, speed + 0 * place)
+        np.testing.assert_array_equal(data.eta2, place // 1000)
+
+
+def test_units_and_flags(drive, tmp_path):
+    drive("create")
+    with xarray.open_dataset(tmp_path / "map.h5", engine="h5netcdf") as data:
+        assert data.attrs["title"] == TITLE
+        assert data.attrs["Conventions"] == "CF-1.10"
+        assert data.attrs["spurflex_version"]
+        for name in data.variables:
+            assert data[name].attrs["units"], name
+            assert data[name].attrs["long_name"], name
+        for prefix in ("", "rigid_"):
+            for name, unit in REALS.items():
+                assert data[prefix + name].attrs["units"] == unit
+                assert data[prefix + name].dtype == np.float64
+            for name in FLAGS:
+                attributes = data[prefix + name].attrs
+                assert data[prefix + name].dtype == np.int32
+                assert attributes["flag_values"].dtype == np.int32
+                assert len(attributes["flag_values"]) == len(attributes["flag_meanings"].split())
+        for name in ETA:
+            assert data[name].attrs["units"] == "percent"
+        assert list(data.motion.attrs["flag_values"]) == [*range(9), 20, 30]
+
+
+def test_new_file_is_empty(drive, tmp_path):
+    drive("create")
+    assert [path.name for path in tmp_path.iterdir()] == ["map.h5"]
+    with xarray.open_dataset(tmp_path / "map.h5", engine="h5netcdf") as data:
+        for name in data.data_vars:
+            if data[name].dtype == np.float64:
+                assert np.isnan(data[name]).all(), name
+            else:
+                assert (data[name] == 0).all(), name
+
+
+@pytest.mark.parametrize(
+    ("support", "variables", "axes"),
+    [
+        ("rigid", RIGID, {"speed"}),
+        ("flexible", COMMON, {"speed", "support_stiffness"}),
+    ],
+)
+def test_one_support(drive, tmp_path, support, variables, axes):
+    drive("write", ranks=2, support=support)
+    with xarray.open_dataset(tmp_path / "map.h5", engine="h5netcdf") as data:
+        assert set(data.data_vars) == variables
+        assert set(data.sizes) == axes
+    drive("verify", ranks=2, support=support)
+
+
+def test_provenance(drive, tmp_path):
+    drive("create")
+    with h5py.File(tmp_path / "map.h5") as file:
+        provenance = {name: text[()].decode() for name, text in file["provenance"].items()}
+    assert set(provenance) == PROVENANCE
+    assert all(provenance.values())
+    assert provenance["date"] == "2023-11-14T22:13:20Z"
+    assert f"  title = '{TITLE}'\n" in provenance["resolved_deck"]
+    assert drive("create", environment={"SOURCE_DATE_EPOCH": "now"}, code=DECK_ERROR).stderr
+
+
+def test_layout_survives_a_kill(drive, tmp_path):
+    """Contiguous, and all of it on the disk from the start."""
+    drive("create")
+    with h5py.File(tmp_path / "map.h5") as file:
+        for dataset in file.values():
+            if isinstance(dataset, h5py.Dataset):
+                assert dataset.chunks is None
+                assert dataset.id.get_create_plist().get_alloc_time() == h5py.h5d.ALLOC_TIME_EARLY
+                assert dataset.id.get_space_status() == h5py.h5d.SPACE_STATUS_ALLOCATED
+
+
+def test_same_bytes_at_any_number_of_ranks(drive, tmp_path):
+    contents = set()
+    for ranks in (1, 2, 3):
+        # glibc fills fresh memory with this: nothing unset may reach the file.
+        drive("write", ranks=ranks, speeds=70, environment={"MALLOC_PERTURB_": str(85 * ranks)})
+        contents.add((tmp_path / "map.h5").read_bytes())
+        (tmp_path / "map.h5").unlink()
+    assert len(contents) == 1
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3])
+def test_kill_between_writes_and_resume(drive, tmp_path, ranks):
+    size = {"speeds": 70, "stiffnesses": 7}
+    drive("write", **size)
+    uninterrupted = (tmp_path / "map.h5").read_bytes()
+    (tmp_path / "map.h5").unlink()
+
+    assert drive("die", ranks=ranks, code=None, **size).returncode != 0
+    with xarray.open_dataset(tmp_path / "map.h5", engine="h5netcdf") as data:
+        done = data.status == 1
+        assert done.any()
+        assert not done.all()
+        assert not np.isnan(data.y1_amplitude.values[done]).any()
+        assert np.isnan(data.y1_amplitude.values[~done]).all()
+    drive("verify", code=1, **size)
+    drive("resume", ranks=ranks, **size)
+    drive("verify", ranks=ranks, **size)
+    assert (tmp_path / "map.h5").read_bytes() == uninterrupted
+    assert [path.name for path in tmp_path.iterdir()] == ["map.h5"]
+
+
+def test_another_deck_is_refused(drive, tmp_path):
+    drive("write")
+    before = (tmp_path / "map.h5").read_bytes()
+    done = drive("resume", ranks=2, stiffnesses=STIFFNESSES + 1, title="other", code=MISMATCH)
+    for line in (
+        f"  file: &case title = '{TITLE}'",
+        "  deck: &case title = 'other'",
+        f"  file: &sweep stiffness_count = {STIFFNESSES}",
+        f"  deck: &sweep stiffness_count = {STIFFNESSES + 1}",
+    ):
+        assert line in done.stderr.splitlines()
+    assert "speed_count" not in done.stderr
+    assert (tmp_path / "map.h5").read_bytes() == before
+    assert [path.name for path in tmp_path.iterdir()] == ["map.h5"]
+
+
+def test_another_version_is_refused(drive, tmp_path):
+    drive("create")
+    with h5py.File(tmp_path / "map.h5", "r+") as file:
+        version = file["provenance/version"][()].decode()
+        del file["provenance/version"]
+        file["provenance/version"] = np.bytes_("0.0.0")
+    done = drive("resume", code=MISMATCH)
+    assert "0.0.0" in done.stderr
+    assert version in done.stderr
+
+
+def no_file(path):
+    path.unlink()
+
+
+def no_hdf5(path):
+    path.write_text("speed,amplitude\n")
+
+
+def empty(path):
+    path.write_bytes(b"")
+
+
+def truncated(path):
+    path.write_bytes(path.read_bytes()[:-1000])
+
+
+def half(path):
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def foreign(path):
+    with h5py.File(path, "w") as file:
+        file["y1_amplitude"] = np.zeros((STIFFNESSES, SPEEDS))
+
+
+def foreign_provenance(path):
+    """The names are there, but hold something else."""
+    with h5py.File(path, "w") as file:
+        file["provenance/version"] = np.arange(1000.0)
+        file["provenance/resolved_deck"] = "a text of variable length"
+
+
+def lacks_variable(path):
+    with h5py.File(path, "r+") as file:
+        del file["y1_rms"]
+
+
+def wrong_extents(path):
+    with h5py.File(path, "r+") as file:
+        del file["rigid_y1_rms"]
+        file["rigid_y1_rms"] = np.zeros(SPEEDS + 1)
+
+
+@pytest.mark.parametrize(
+    ("damage", "word"),
+    [
+        (no_file, "does not exist"),
+        (no_hdf5, "not an HDF5 file"),
+        (empty, "not an HDF5 file"),
+        (truncated, "truncated"),
+        (half, "truncated"),
+        (foreign, "not a result file of spurflex"),
+        (foreign_provenance, "not a result file of spurflex"),
+        (lacks_variable, "y1_rms"),
+        (wrong_extents, "rigid_y1_rms"),
+    ],
+)
+def test_unfit_files_are_refused(drive, tmp_path, damage, word):
+    path = tmp_path / "map.h5"
+    drive("write")
+    damage(path)
+    before = path.read_bytes() if path.exists() else None
+    done = drive("resume", ranks=2, code=MISMATCH)
+    assert word in done.stderr
+    assert "map.h5" in done.stderr
+    assert (path.read_bytes() if path.exists() else None) == before
+    assert not (tmp_path / "map.h5.lock").exists()
+
+
+def test_existing_file_is_not_replaced(drive, tmp_path):
+    drive("write")
+    before = (tmp_path / "map.h5").read_bytes()
+    assert "exists already" in drive("create", code=MISMATCH).stderr
+    assert (tmp_path / "map.h5").read_bytes() == before
+
+
+def test_left_over_part_is_replaced(drive, tmp_path):
+    (tmp_path / "map.h5.part").write_bytes(b"half a file")
+    drive("write")
+    drive("verify")
+    assert [path.name for path in tmp_path.iterdir()] == ["map.h5"]
+
+
+def test_missing_folder(drive):
+    done = drive("create", ranks=2, file="nowhere/map.h5", code=1)
+    assert "No such file or directory" in done.stderr
+
+
+def test_two_runs_on_one_file(drive, command, tmp_path):
+    drive("create")
+    shutil.move(tmp_path / "map.h5", tmp_path / "spare.h5")
+    with subprocess.Popen(command("hold", ranks=2), cwd=tmp_path) as holder:
+        try:
+            deadline = time.monotonic() + 60
+            while not (tmp_path / "map.h5").exists():
+                assert time.monotonic() < deadline
+                assert holder.poll() is None
+                time.sleep(0.05)
+            for mode in ("resume", "create"):
+                done = drive(mode, ranks=2, code=MISMATCH)
+                assert "another run (process " in done.stderr
+        finally:
+            (tmp_path / "map.h5.go").touch()
+            assert holder.wait(60) == 0
+    drive("resume")
+    assert not (tmp_path / "map.h5.lock").exists()
+
+
+def test_lock_of_a_killed_run_is_free(drive, tmp_path):
+    size = {"speeds": 70, "stiffnesses": 7}
+    drive("die", code=None, **size)
+    assert (tmp_path / "map.h5.lock").exists()
+    drive("resume", **size)
+    assert not (tmp_path / "map.h5.lock").exists()

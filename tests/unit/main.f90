@@ -1,0 +1,52 @@
+!> Runs the unit tests: every suite, or the one named on the command line.
+!> Under mpirun every rank runs the tests; the exit code tells whether any failed on any rank.
+program unit_tests
+   use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
+   use mpi_f08, only: MPI_Allreduce, MPI_COMM_WORLD, MPI_Finalize, MPI_Init, MPI_INTEGER, MPI_SUM
+   use test_contact, only: collect_contact
+   use test_equations, only: collect_equations
+   use test_mesh, only: collect_mesh
+   use test_paper_model, only: collect_paper_model
+   use test_results, only: collect_results
+   use test_support, only: new_testsuite, run_testsuite, select_suite, testsuite_type
+   use test_text, only: collect_text
+   implicit none
+
+   type(testsuite_type), allocatable :: suites(:)
+   character(len=64) :: name
+   logical :: named
+   integer :: i, only_one, failures, all_failures
+
+   suites = [ &
+            new_testsuite('text', collect_text), &
+            new_testsuite('results', collect_results), &
+            new_testsuite('paper_model', collect_paper_model), &
+            new_testsuite('mesh', collect_mesh), &
+            new_testsuite('equations', collect_equations), &
+            new_testsuite('contact', collect_contact) &
+            ]
+
+   call MPI_Init()
+   only_one = 0
+   failures = 0
+   named = command_argument_count() > 0
+   if (named) then
+      call get_command_argument(1, name)
+      only_one = select_suite(suites, trim(name))
+      if (only_one == 0) then
+         write (error_unit, '(3a)') "no suite '", trim(name), "'; there are:"
+         write (error_unit, '(2x, a)') (suites(i)%name, i=1, size(suites))
+         failures = 1
+      end if
+   end if
+
+   do i = 1, size(suites)
+      if (named .and. only_one /= i) cycle
+      write (output_unit, '(a)') suites(i)%name
+      call run_testsuite(suites(i)%collect, output_unit, failures)
+   end do
+
+   call MPI_Allreduce(failures, all_failures, 1, MPI_INTEGER, MPI_SUM, MPI_COMM_WORLD)
+   call MPI_Finalize()
+   if (all_failures > 0) stop 1
+end program unit_tests
