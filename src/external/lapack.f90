@@ -6,7 +6,10 @@ module spurflex_external_lapack
    implicit none
    private
 
-   public :: invert_positive_definite
+   public :: invert_positive_definite, invert_complex, eigenvalues, eigenvectors, solve_real
+
+   !> Work space of `dgeev` per row of the matrix.
+   integer, parameter :: work_per_row = 8
 
    interface
       !> Cholesky factorisation.
@@ -26,6 +29,31 @@ module spurflex_external_lapack
          real(wp), intent(inout) :: a(lda, *)
          integer, intent(out) :: info
       end subroutine dpotri
+
+      !> Eigenvalues and eigenvectors of a general matrix.
+      subroutine dgeev(jobvl, jobvr, n, a, lda, wr, wi, vl, ldvl, vr, ldvr, work, lwork, info)
+         import :: wp
+         character(len=1), intent(in) :: jobvl, jobvr
+         integer, intent(in) :: n, lda, ldvl, ldvr, lwork
+         real(wp), intent(inout) :: a(lda, *), wr(*), wi(*), vl(ldvl, *), vr(ldvr, *), work(*)
+         integer, intent(out) :: info
+      end subroutine dgeev
+
+      !> Solution of complex linear equations.
+      subroutine zgesv(n, nrhs, a, lda, ipiv, b, ldb, info)
+         import :: wp
+         integer, intent(in) :: n, nrhs, lda, ldb
+         complex(wp), intent(inout) :: a(lda, *), b(ldb, *)
+         integer, intent(out) :: ipiv(*), info
+      end subroutine zgesv
+
+      !> Solution of real linear equations.
+      subroutine dgesv(n, nrhs, a, lda, ipiv, b, ldb, info)
+         import :: wp
+         integer, intent(in) :: n, nrhs, lda, ldb
+         real(wp), intent(inout) :: a(lda, *), b(ldb, *)
+         integer, intent(out) :: ipiv(*), info
+      end subroutine dgesv
    end interface
 
 contains
@@ -53,5 +81,101 @@ contains
          inverse(:j - 1, j) = inverse(j, :j - 1)
       end do
    end subroutine invert_positive_definite
+
+   !> Eigenvalues and right eigenvectors of a general real matrix.
+   subroutine eigenvectors(matrix, values, vectors, error)
+      !> The matrix, shape (n, n).
+      real(wp), intent(in) :: matrix(:, :)
+      !> Eigenvalues, conjugate pairs next to each other, shape (n).
+      complex(wp), allocatable, intent(out) :: values(:)
+      !> Eigenvectors in columns, shape (n, n).
+      complex(wp), allocatable, intent(out) :: vectors(:, :)
+      !> Set where the iteration does not converge.
+      type(error_type), allocatable, intent(out) :: error
+
+      real(wp) :: a(size(matrix, 1), size(matrix, 1)), right(size(matrix, 1), size(matrix, 1))
+      real(wp) :: re(size(matrix, 1)), im(size(matrix, 1)), left(1, 1), work(work_per_row*size(matrix, 1))
+      integer :: n, info, j
+
+      n = size(matrix, 1)
+      a = matrix
+      call dgeev('N', 'V', n, a, n, re, im, left, 1, right, n, work, size(work), info)
+      if (info /= 0) then
+         call fatal_error(error, 'the eigenvalues of a matrix do not converge (code '//to_text(info)//')')
+         return
+      end if
+      allocate (values(n), vectors(n, n))
+      values = cmplx(re, im, wp)
+      do j = 1, n
+         if (im(j) > 0.0_wp) then
+            vectors(:, j) = cmplx(right(:, j), right(:, j + 1), wp)
+            vectors(:, j + 1) = conjg(vectors(:, j))
+         else if (.not. im(j) < 0.0_wp) then
+            vectors(:, j) = cmplx(right(:, j), 0.0_wp, wp)
+         end if
+      end do
+   end subroutine eigenvectors
+
+   !> Eigenvalues of a general real matrix.
+   subroutine eigenvalues(matrix, values, error)
+      !> The matrix, shape (n, n).
+      real(wp), intent(in) :: matrix(:, :)
+      !> Eigenvalues, shape (n).
+      complex(wp), allocatable, intent(out) :: values(:)
+      !> Set where the iteration does not converge.
+      type(error_type), allocatable, intent(out) :: error
+
+      real(wp) :: a(size(matrix, 1), size(matrix, 1)), re(size(matrix, 1)), im(size(matrix, 1))
+      real(wp) :: none(1, 1), work(work_per_row*size(matrix, 1))
+      integer :: n, info
+
+      n = size(matrix, 1)
+      a = matrix
+      call dgeev('N', 'N', n, a, n, re, im, none, 1, none, 1, work, size(work), info)
+      if (info /= 0) then
+         call fatal_error(error, 'the eigenvalues of a matrix do not converge (code '//to_text(info)//')')
+         return
+      end if
+      allocate (values(n))
+      values = cmplx(re, im, wp)
+   end subroutine eigenvalues
+
+   !> Inverse of a complex matrix.
+   subroutine invert_complex(matrix, inverse, error)
+      !> The matrix, shape (n, n).
+      complex(wp), intent(in) :: matrix(:, :)
+      !> Its inverse, shape (n, n).
+      complex(wp), allocatable, intent(out) :: inverse(:, :)
+      !> Set where the matrix is singular.
+      type(error_type), allocatable, intent(out) :: error
+
+      complex(wp) :: a(size(matrix, 1), size(matrix, 1))
+      integer :: pivots(size(matrix, 1)), n, info, i
+
+      n = size(matrix, 1)
+      a = matrix
+      allocate (inverse(n, n), source=(0.0_wp, 0.0_wp))
+      do i = 1, n
+         inverse(i, i) = (1.0_wp, 0.0_wp)
+      end do
+      call zgesv(n, n, a, n, pivots, inverse, n, info)
+      if (info /= 0) call fatal_error(error, 'a matrix is singular (pivot '//to_text(info)//')')
+   end subroutine invert_complex
+
+   !> Solve real linear equations in place.
+   subroutine solve_real(matrix, right_side, error)
+      !> The matrix, shape (n, n); destroyed.
+      real(wp), intent(inout), contiguous :: matrix(:, :)
+      !> Right side before, solution after, shape (n).
+      real(wp), intent(inout), contiguous :: right_side(:)
+      !> Set where the matrix is singular.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer :: pivots(size(matrix, 1)), n, info
+
+      n = size(matrix, 1)
+      call dgesv(n, 1, matrix, n, pivots, right_side, n, info)
+      if (info /= 0) call fatal_error(error, 'a matrix is singular (pivot '//to_text(info)//')')
+   end subroutine solve_real
 
 end module spurflex_external_lapack

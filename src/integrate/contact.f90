@@ -12,19 +12,16 @@ module spurflex_integrate_contact
    implicit none
    private
 
-   public :: contact_force, lanes
-
-   !> Points advanced side by side: one AVX-512 register or two AVX2 registers of doubles.
-   integer, parameter :: lanes = 8
+   public :: contact_force
 
 contains
 
-   !> Mesh force at the end of a step, in every lane.
-   pure subroutine contact_force(d, v, stiffness, damping, half_backlash, h_d, h_v, force)
+   !> Mesh force at the end of a step.
+   elemental subroutine contact_force(d, v, stiffness, damping, half_backlash, h_d, h_v, force, by_d, by_v)
       !> Mesh deflection without mesh force [m].
-      real(wp), intent(in) :: d(lanes)
+      real(wp), intent(in) :: d
       !> Its rate without mesh force [m/s].
-      real(wp), intent(in) :: v(lanes)
+      real(wp), intent(in) :: v
       !> Mesh stiffness [N/m].
       real(wp), intent(in) :: stiffness
       !> Mesh damping [N s/m].
@@ -32,23 +29,30 @@ contains
       !> Half of the backlash [m].
       real(wp), intent(in) :: half_backlash
       !> Deflection that a unit force takes away [m/N].
-      real(wp), intent(in) :: h_d(lanes)
+      real(wp), intent(in) :: h_d
       !> Rate that a unit force takes away [m/(N s)].
-      real(wp), intent(in) :: h_v(lanes)
+      real(wp), intent(in) :: h_v
       !> Mesh force f_m, Eq. (5) [N].
-      real(wp), intent(out) :: force(lanes)
+      real(wp), intent(out) :: force
+      !> Derivatives of the force by d and by v [N/m, N s/m].
+      real(wp), intent(out) :: by_d, by_v
 
-      real(wp) :: gap, gap_force, free, beyond
-      integer :: l
+      real(wp) :: gap, gap_force, free, beyond, divisor
 
-      do l = 1, lanes
-         gap = 1.0_wp + damping*h_v(l)
-         gap_force = damping*v(l)/gap
-         free = d(l) - h_d(l)*gap_force
-         ! How far the free deflection lies beyond the gap, on either side.
-         beyond = max(free - half_backlash, 0.0_wp) + min(free + half_backlash, 0.0_wp)
-         force(l) = gap_force + stiffness*beyond/(gap + stiffness*h_d(l))
-      end do
+      gap = 1.0_wp + damping*h_v
+      gap_force = damping*v/gap
+      free = d - h_d*gap_force
+      ! How far the free deflection lies beyond the gap, on either side.
+      beyond = max(free - half_backlash, 0.0_wp) + min(free + half_backlash, 0.0_wp)
+      divisor = gap + stiffness*h_d
+      force = gap_force + stiffness*beyond/divisor
+      if (free >= half_backlash .or. free <= -half_backlash) then
+         by_d = stiffness/divisor
+         by_v = damping/divisor
+      else
+         by_d = 0.0_wp
+         by_v = damping/gap
+      end if
    end subroutine contact_force
 
 end module spurflex_integrate_contact

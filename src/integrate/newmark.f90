@@ -1,274 +1,287 @@
-!> Newmark's method with a constant step, many points side by side.
+!> Newmark's method with a constant step, for any beta and gamma.
 !>
-!> With S = M + gamma dt C + beta dt^2 K the acceleration at the end of a step without mesh force is -S^-1 (C v~ + K q~),
-!> with v~ and q~ the usual predictors; the mesh force then follows exactly from one scalar equation
-!> (`spurflex_integrate_contact`) and enters through S^-1 g alone. S is factorised once per point, no step iterates.
+!> With S = M + gamma dt C + beta dt^2 K, factorised once with LAPACK, a step is linear in the state w = [q, q'] and in the mesh force
+!> at its two ends,
+!>
+!>     w_1 = A w_0 - (f_0 - F) b_0 - (f_1 - F) b_1
+!>
+!> and f_1 follows exactly from one scalar equation (`spurflex_integrate_contact`): no step iterates.
 !> Reference: N. M. Newmark, J. Eng. Mech. Div. 85 (1959) 67.
 module spurflex_integrate_newmark
    use spurflex_base_error, only: error_type
    use spurflex_base_kinds, only: wp, pi
    use spurflex_external_lapack, only: invert_positive_definite
    use spurflex_integrate_contact, only: contact_force
-   use spurflex_integrate_lanes, only: integrator_type, trajectory_type, lanes, observables
-   use spurflex_integrate_options, only: solver_options
-   use spurflex_model_equations, only: equations_type, flexible_dof
+   use spurflex_integrate_period_map, only: period_map, orbit_type, observables, reserve_orbit
+   use spurflex_model_equations, only: equations_type
    use spurflex_model_mesh, only: mesh_force, mesh_stiffness, transmission_error, transmission_error_rate
    implicit none
    private
 
-   public :: newmark_type, new_newmark
+   public :: newmark_map
 
-   !> Degrees of freedom in the arrays: a rigid support leaves some idle, at zero, so that one kernel serves both.
-   integer, parameter :: padded = flexible_dof
-
-   !> Newmark's method on `lanes` points.
-   type, extends(integrator_type) :: newmark_type
-      private
+   !> Period map by Newmark's method. The state holds the deviation from the static equilibrium, then its rate.
+   type, extends(period_map) :: newmark_map
       !> Newmark's parameters.
-      real(wp) :: beta = 0.0_wp, gamma = 0.0_wp
-      !> Mesh stiffness, static transmission error and its derivative by the phase at each step, shape (0:samples).
-      real(wp), allocatable :: table_stiffness(:), table_error(:), table_error_rate(:)
-      !> Mesh damping and half of the backlash, the same in all lanes.
-      real(wp) :: mesh_damping = 0.0_wp, half_backlash = 0.0_wp
-      !> Observation rows, the same in all lanes, shape (observables, n).
-      real(wp), allocatable :: observation(:, :)
-      !> Gradient of the mesh deflection, the same in all lanes, shape (n).
-      real(wp), allocatable :: direction(:)
-      !> S^-1, shape (lanes, n, n), and S^-1 g, shape (lanes, n).
-      real(wp), allocatable :: inverse(:, :, :), response(:, :)
-      !> Diagonals of C and K, shape (lanes, n).
-      real(wp), allocatable :: damping(:, :), stiffness(:, :)
-      !> Acceleration at the section, shape (lanes, n).
-      real(wp), allocatable :: acceleration(:, :)
-      !> Time step, mesh frequency, mean mesh force, static deflection, what a unit force takes from delta and its rate.
-      real(wp), dimension(lanes) :: step = 1.0_wp, frequency = 1.0_wp, mean_force = 0.0_wp, static_deflection = 0.0_wp, &
-         taken_deflection = 0.0_wp, taken_rate = 0.0_wp
+      real(wp) :: beta = 0.25_wp, gamma = 0.5_wp
+      !> Equations of motion of the point.
+      type(equations_type), private :: equations
+      !> The step: A transposed, b_0, b_1; shapes (size, size) and (size).
+      real(wp), allocatable, private :: carry(:, :), before(:), after(:)
+      !> Rows that give the mesh deflection and its rate, shape (size, 2).
+      real(wp), allocatable, private :: deflection_row(:, :)
+      !> Observed accelerations from the state, shape (observables, size), and from the mesh force, shape (observables).
+      real(wp), allocatable, private :: acceleration(:, :), acceleration_force(:)
+      !> Mesh stiffness, delta_s + e_m and its rate at each step, shape (0:steps).
+      real(wp), allocatable, private :: stiffness(:), deflection(:), deflection_rate(:)
    contains
       procedure :: load => load_newmark
       procedure :: advance => advance_newmark
-   end type newmark_type
+      procedure :: to_state => state_from_coordinates
+      procedure :: from_state => coordinates_from_state
+   end type newmark_map
 
 contains
 
-   !> An integrator without points: every lane is at rest until it is loaded.
-   pure function new_newmark(equations, options) result(integrator)
-      !> Equations of any point of the case; degrees of freedom, mesh and observation are the same for all.
-      type(equations_type), intent(in) :: equations
-      !> Steps per period, beta and gamma.
-      type(solver_options), intent(in) :: options
-      !> The integrator.
-      type(newmark_type) :: integrator
-
-      integer :: n, s, steps
-      real(wp) :: phase
-
-      n = equations%n
-      steps = options%steps_per_period
-      integrator%n = n
-      integrator%samples = steps
-      integrator%beta = options%newmark_beta
-      integrator%gamma = options%newmark_gamma
-      integrator%mesh_damping = equations%mesh%damping
-      integrator%half_backlash = equations%mesh%half_backlash
-      integrator%observation = equations%observation
-      allocate (integrator%direction(padded), source=0.0_wp)
-      integrator%direction(:n) = equations%direction
-      allocate (integrator%table_stiffness(0:steps), integrator%table_error(0:steps), integrator%table_error_rate(0:steps))
-      do s = 0, steps
-         phase = 2.0_wp*pi*real(s, wp)/real(steps, wp)
-         integrator%table_stiffness(s) = mesh_stiffness(equations%mesh, phase)
-         integrator%table_error(s) = transmission_error(equations%mesh, phase)
-         integrator%table_error_rate(s) = transmission_error_rate(equations%mesh, phase)
-      end do
-      allocate (integrator%inverse(lanes, padded, padded), source=0.0_wp)
-      allocate (integrator%response(lanes, padded), integrator%damping(lanes, padded), integrator%stiffness(lanes, padded), &
-         integrator%position(lanes, padded), integrator%velocity(lanes, padded), integrator%acceleration(lanes, padded), &
-         source=0.0_wp)
-   end function new_newmark
-
-   !> Put a point into a lane: factorise its effective matrix, find its acceleration at the section.
-   subroutine load_newmark(self, lane, equations, position, velocity, error)
-      !> Integrator.
-      class(newmark_type), intent(inout) :: self
-      !> Lane, 1..lanes.
-      integer, intent(in) :: lane
+   !> Take an operating point and a number of steps per period.
+   subroutine load_newmark(self, equations, steps, error)
+      !> Map.
+      class(newmark_map), intent(inout) :: self
       !> Equations of motion of the point.
       type(equations_type), intent(in) :: equations
-      !> Deviation from the static equilibrium at phase 0, shape (n).
-      real(wp), intent(in) :: position(:)
-      !> Its rate, shape (n).
-      real(wp), intent(in) :: velocity(:)
+      !> Steps per mesh period.
+      integer, intent(in) :: steps
       !> Set where the mass or the effective matrix is not positive definite.
       type(error_type), allocatable, intent(out) :: error
 
-      real(wp), allocatable :: effective(:, :), inverse(:, :), inverse_mass(:, :)
-      real(wp) :: dt, delta, rate, force
-      integer :: i, n
+      real(wp), allocatable :: inverse_mass(:, :), inverse(:, :), effective(:, :)
+      real(wp) :: dt, phase, reference
+      integer :: n, i, s
 
-      n = self%n
-      self%period(lane) = 2.0_wp*pi/equations%frequency
-      dt = self%period(lane)/real(self%samples, wp)
-      effective = equations%mass
-      do i = 1, self%n
+      n = equations%n
+      self%equations = equations
+      self%size = 2*n
+      self%steps = steps
+      self%half_backlash = equations%mesh%half_backlash
+      self%period = 2.0_wp*pi/equations%frequency
+      dt = self%period/real(steps, wp)
+      call invert_positive_definite(equations%mass, inverse_mass, error)
+      if (allocated(error)) return
+      allocate (effective(n, n), source=equations%mass)
+      do i = 1, n
          effective(i, i) = effective(i, i) + self%gamma*dt*equations%damping(i) + self%beta*dt**2*equations%stiffness(i)
       end do
       call invert_positive_definite(effective, inverse, error)
       if (allocated(error)) return
-      call invert_positive_definite(equations%mass, inverse_mass, error)
-      if (allocated(error)) return
+      call assemble_step(self, dt, inverse_mass, inverse)
 
-      self%step(lane) = dt
-      self%frequency(lane) = equations%frequency
-      self%mean_force(lane) = equations%mean_force
-      self%static_deflection(lane) = equations%static_deflection
-      self%inverse(lane, :n, :n) = inverse
-      self%response(lane, :n) = matmul(inverse, equations%direction)
-      self%damping(lane, :n) = equations%damping
-      self%stiffness(lane, :n) = equations%stiffness
-      self%taken_deflection(lane) = self%beta*dt**2*dot_product(equations%direction, self%response(lane, :n))
-      self%taken_rate(lane) = self%gamma*dt*dot_product(equations%direction, self%response(lane, :n))
+      self%deflection_row = reshape([equations%direction, 0.0_wp*equations%direction, &
+                                     0.0_wp*equations%direction, equations%direction], [2*n, 2])
+      self%acceleration_force = -matmul(equations%observation, matmul(inverse_mass, equations%direction))
+      self%acceleration = -matmul(equations%observation, matmul(inverse_mass, diagonals(equations)))
+      reference = sqrt(equations%mesh%mean_stiffness*dot_product(equations%direction, &
+                                                                 matmul(inverse_mass, equations%direction)))
+      self%weight = [abs(equations%direction), abs(equations%direction)/reference]
+      self%deflection_weight = self%weight
+      do i = 1, n
+         self%weight(i) = max(self%weight(i), maxval(abs(equations%observation(:, i))))
+         self%weight(n + i) = max(self%weight(n + i), maxval(abs(equations%observation(:, i)))/reference)
+      end do
 
-      self%position(lane, :n) = position
-      self%velocity(lane, :n) = velocity
-      delta = equations%static_deflection + self%table_error(0) + dot_product(equations%direction, position)
-      rate = equations%frequency*self%table_error_rate(0) + dot_product(equations%direction, velocity)
-      force = mesh_force(equations%mesh, 0.0_wp, delta, rate)
-      self%acceleration(lane, :n) = -matmul(inverse_mass, equations%damping*velocity + equations%stiffness*position &
-                                           + equations%direction*(force - equations%mean_force))
+      if (allocated(self%stiffness)) deallocate (self%stiffness, self%deflection, self%deflection_rate)
+      allocate (self%stiffness(0:steps), self%deflection(0:steps), self%deflection_rate(0:steps))
+      do s = 0, steps
+         phase = 2.0_wp*pi*real(s, wp)/real(steps, wp)
+         self%stiffness(s) = mesh_stiffness(equations%mesh, phase)
+         self%deflection(s) = equations%static_deflection + transmission_error(equations%mesh, phase)
+         self%deflection_rate(s) = equations%frequency*transmission_error_rate(equations%mesh, phase)
+      end do
    end subroutine load_newmark
 
-   !> Advance every lane by one mesh period.
-   subroutine advance_newmark(self, trajectory)
-      !> Integrator.
-      class(newmark_type), intent(inout) :: self
-      !> If present, the period is recorded.
-      type(trajectory_type), intent(inout), optional :: trajectory
+   !> [K, C] as a matrix that acts on the state.
+   pure function diagonals(equations) result(matrix)
+      !> Equations of motion.
+      type(equations_type), intent(in) :: equations
+      !> Shape (n, 2 n).
+      real(wp), allocatable :: matrix(:, :)
 
+      integer :: i
+
+      allocate (matrix(equations%n, 2*equations%n), source=0.0_wp)
+      do i = 1, equations%n
+         matrix(i, i) = equations%stiffness(i)
+         matrix(i, equations%n + i) = equations%damping(i)
+      end do
+   end function diagonals
+
+   !> The linear map of one step.
+   pure subroutine assemble_step(self, dt, inverse_mass, inverse)
+      !> Map.
+      class(newmark_map), intent(inout) :: self
+      !> Time step [s].
+      real(wp), intent(in) :: dt
+      !> M^-1 and S^-1, shape (n, n).
+      real(wp), intent(in) :: inverse_mass(:, :), inverse(:, :)
+
+      real(wp) :: unit(self%size), zero(self%size)
+      integer :: i
+
+      if (allocated(self%carry)) deallocate (self%carry, self%before, self%after)
+      allocate (self%carry(self%size, self%size), self%before(self%size), self%after(self%size))
+      zero = 0.0_wp
+      do i = 1, self%size
+         unit = 0.0_wp
+         unit(i) = 1.0_wp
+         self%carry(:, i) = stepped(unit, 0.0_wp)
+      end do
+      self%before = -stepped(zero, 1.0_wp)
+      self%after = [self%beta*dt**2*matmul(inverse, self%equations%direction), &
+                    self%gamma*dt*matmul(inverse, self%equations%direction)]
+
+   contains
+
+      !> A state one step later, with a mesh force at the start and none at the end.
+      pure function stepped(state, force) result(later)
+         !> State at the start.
+         real(wp), intent(in) :: state(:)
+         !> Mesh force at the start, without its mean.
+         real(wp), intent(in) :: force
+         !> State at the end.
+         real(wp) :: later(size(state))
+
+         real(wp), dimension(size(state)/2) :: q, v, a
+
+         q = state(:size(state)/2)
+         v = state(size(state)/2 + 1:)
+         associate (c => self%equations%damping, k => self%equations%stiffness, g => self%equations%direction)
+            a = -matmul(inverse_mass, c*v + k*q + g*force)
+            q = q + dt*v + (0.5_wp - self%beta)*dt**2*a
+            v = v + (1.0_wp - self%gamma)*dt*a
+            a = -matmul(inverse, c*v + k*q)
+         end associate
+         later = [q + self%beta*dt**2*a, v + self%gamma*dt*a]
+      end function stepped
+
+   end subroutine assemble_step
+
+   !> Advance a state by one mesh period.
+   subroutine advance_newmark(self, state, tangents, orbit)
+      !> Map.
+      class(newmark_map), intent(inout) :: self
+      !> State at the section, shape (size).
+      real(wp), intent(inout) :: state(:)
+      !> Tangents that see the same contact, one in a row, shape (tangents, size).
+      real(wp), intent(inout), optional :: tangents(:, :)
+      !> If present, the period is recorded.
+      type(orbit_type), intent(inout), optional :: orbit
+
+      real(wp) :: force, next, delta, rate, h_d, h_v, by_d, by_v, free(self%size)
+      real(wp), allocatable :: tangent_force(:)
       integer :: s
 
-      self%smallest_deflection = huge(1.0_wp)
-      self%largest_deflection = -huge(1.0_wp)
-      if (present(trajectory)) then
-         call record(self, 0, trajectory)
-         do s = 1, self%samples
-            call advance_steps(self, s, s)
-            call record(self, s, trajectory)
+      if (present(orbit)) call reserve_orbit(orbit, self%steps)
+      h_d = dot_product(self%deflection_row(:, 1), self%after)
+      h_v = dot_product(self%deflection_row(:, 2), self%after)
+      associate (mesh => self%equations%mesh, mean => self%equations%mean_force, row => self%deflection_row)
+         delta = self%deflection(0) + dot_product(row(:, 1), state)
+         rate = self%deflection_rate(0) + dot_product(row(:, 2), state)
+         self%smallest_deflection = delta
+         self%largest_deflection = delta
+         call contact_force(delta, rate, self%stiffness(0), mesh%damping, mesh%half_backlash, 0.0_wp, 0.0_wp, force, by_d, by_v)
+         if (present(tangents)) tangent_force = matmul(tangents, by_d*row(:, 1) + by_v*row(:, 2))
+         if (present(orbit)) call record(self, 0, state, force - mean, orbit)
+         do s = 1, self%steps
+            free = matmul(self%carry, state) - (force - mean)*self%before
+            delta = self%deflection(s) + dot_product(row(:, 1), free) + h_d*mean
+            rate = self%deflection_rate(s) + dot_product(row(:, 2), free) + h_v*mean
+            call contact_force(delta, rate, self%stiffness(s), mesh%damping, mesh%half_backlash, h_d, h_v, next, by_d, by_v)
+            delta = delta - h_d*next
+            self%smallest_deflection = min(self%smallest_deflection, delta)
+            self%largest_deflection = max(self%largest_deflection, delta)
+            state = free - (next - mean)*self%after
+            if (present(tangents)) call carry_tangents(self, by_d, by_v, tangent_force, tangents)
+            force = next
+            if (present(orbit)) call record(self, s, state, force - mean, orbit)
          end do
-      else
-         call advance_steps(self, 1, self%samples)
-      end if
+      end associate
    end subroutine advance_newmark
 
-   !> Advance every lane over some steps of the period.
-   subroutine advance_steps(self, first, last)
-      !> Integrator.
-      class(newmark_type), intent(inout) :: self
-      !> First and last step, 1..samples.
-      integer, intent(in) :: first, last
+   !> Carry tangents over a step.
+   pure subroutine carry_tangents(self, by_d, by_v, force, tangents)
+      !> Map.
+      class(newmark_map), intent(in) :: self
+      !> Derivatives of the mesh force by the deflection and the rate that the step has without it.
+      real(wp), intent(in) :: by_d, by_v
+      !> Mesh force of each tangent at the start before, at the end after, shape (tangents).
+      real(wp), intent(inout) :: force(:)
+      !> Tangents, one in a row, shape (tangents, size).
+      real(wp), intent(inout) :: tangents(:, :)
 
-      call run_steps(first, last, self%position, self%velocity, self%acceleration, self%inverse, &
-         self%response, self%damping, self%stiffness, self%direction, self%step, self%beta, self%gamma, &
-         self%table_stiffness(first:last), self%table_error(first:last), self%table_error_rate(first:last), &
-         self%mesh_damping, self%half_backlash, self%static_deflection, self%frequency, self%mean_force, &
-         self%taken_deflection, self%taken_rate, self%smallest_deflection, self%largest_deflection)
-   end subroutine advance_steps
+      integer :: j
 
-   !> The steps themselves. The innermost loops run over the lanes, whose number is fixed, so that they become vector
-   !> instructions; a row of S^-1 is written out to keep its sum in a register.
-   pure subroutine run_steps(first, last, q, v, a, inverse, response, damping, stiffness, direction, dt, beta, gamma, &
-                             k_mesh, error, error_rate, c_mesh, half_backlash, static_deflection, frequency, mean_force, &
-                             h_d, h_v, smallest, largest)
-      !> First and last step.
-      integer, intent(in) :: first, last
-      !> Deviation, its rate and its acceleration.
-      real(wp), intent(inout) :: q(lanes, padded), v(lanes, padded), a(lanes, padded)
-      !> S^-1, S^-1 g, diagonals of C and K.
-      real(wp), intent(in) :: inverse(lanes, padded, padded), response(lanes, padded), damping(lanes, padded), &
-         stiffness(lanes, padded)
-      !> Gradient of the mesh deflection.
-      real(wp), intent(in) :: direction(padded)
-      !> Time step; Newmark's parameters.
-      real(wp), intent(in) :: dt(lanes), beta, gamma
-      !> Mesh stiffness, e_m and its derivative by the phase at the end of each step.
-      real(wp), intent(in) :: k_mesh(first:last), error(first:last), error_rate(first:last)
-      !> Mesh damping, half of the backlash.
-      real(wp), intent(in) :: c_mesh, half_backlash
-      !> Static mesh deflection, mesh frequency, mean mesh force.
-      real(wp), intent(in) :: static_deflection(lanes), frequency(lanes), mean_force(lanes)
-      !> What a unit mesh force takes from the deflection and its rate.
-      real(wp), intent(in) :: h_d(lanes), h_v(lanes)
-      !> Extremes of the mesh deflection so far.
-      real(wp), intent(inout) :: smallest(lanes), largest(lanes)
-
-      real(wp), dimension(lanes) :: delta, rate, force
-      real(wp) :: load(lanes, padded), free(lanes, padded), total
-      integer :: i, l, s
-
-      do s = first, last
-         do i = 1, padded
-            do l = 1, lanes
-               q(l, i) = q(l, i) + dt(l)*(v(l, i) + (0.5_wp - beta)*dt(l)*a(l, i))
-               v(l, i) = v(l, i) + (1.0_wp - gamma)*dt(l)*a(l, i)
-               load(l, i) = -damping(l, i)*v(l, i) - stiffness(l, i)*q(l, i)
-            end do
-         end do
-         do l = 1, lanes
-            delta(l) = static_deflection(l) + error(s) + h_d(l)*mean_force(l)
-            rate(l) = frequency(l)*error_rate(s) + h_v(l)*mean_force(l)
-         end do
-         do i = 1, padded
-            do l = 1, lanes
-               total = inverse(l, 1, i)*load(l, 1)
-               total = total + inverse(l, 2, i)*load(l, 2)
-               total = total + inverse(l, 3, i)*load(l, 3)
-               total = total + inverse(l, 4, i)*load(l, 4)
-               total = total + inverse(l, 5, i)*load(l, 5)
-               total = total + inverse(l, 6, i)*load(l, 6)
-               total = total + inverse(l, 7, i)*load(l, 7)
-               total = total + inverse(l, 8, i)*load(l, 8)
-               free(l, i) = total
-            end do
-            do l = 1, lanes
-               delta(l) = delta(l) + direction(i)*(q(l, i) + beta*dt(l)*dt(l)*free(l, i))
-               rate(l) = rate(l) + direction(i)*(v(l, i) + gamma*dt(l)*free(l, i))
-            end do
-         end do
-         call contact_force(delta, rate, k_mesh(s), c_mesh, half_backlash, h_d, h_v, force)
-         do l = 1, lanes
-            delta(l) = delta(l) - h_d(l)*force(l)
-            smallest(l) = min(smallest(l), delta(l))
-            largest(l) = max(largest(l), delta(l))
-            force(l) = force(l) - mean_force(l)
-         end do
-         do i = 1, padded
-            do l = 1, lanes
-               a(l, i) = free(l, i) - response(l, i)*force(l)
-               v(l, i) = v(l, i) + gamma*dt(l)*a(l, i)
-               q(l, i) = q(l, i) + beta*dt(l)*dt(l)*a(l, i)
-            end do
-         end do
+      tangents = matmul(tangents, transpose(self%carry))
+      do j = 1, self%size
+         tangents(:, j) = tangents(:, j) - force*self%before(j)
       end do
-   end subroutine run_steps
+      force = matmul(tangents, by_d*self%deflection_row(:, 1) + by_v*self%deflection_row(:, 2))
+      do j = 1, self%size
+         tangents(:, j) = tangents(:, j) - force*self%after(j)
+      end do
+   end subroutine carry_tangents
 
-   !> Record the observed quantities of every lane.
-   pure subroutine record(self, sample, trajectory)
-      !> Integrator.
-      class(newmark_type), intent(in) :: self
-      !> Sample, 0..samples.
+   !> Record one sample.
+   pure subroutine record(self, sample, state, force, orbit)
+      !> Map.
+      class(newmark_map), intent(in) :: self
+      !> Sample, 0..steps.
       integer, intent(in) :: sample
+      !> State, shape (size).
+      real(wp), intent(in) :: state(:)
+      !> Mesh force without its mean [N].
+      real(wp), intent(in) :: force
       !> Where to.
-      type(trajectory_type), intent(inout) :: trajectory
+      type(orbit_type), intent(inout) :: orbit
 
-      integer :: i, k
+      integer :: n
 
-      trajectory%value(:, :, sample) = 0.0_wp
-      trajectory%rate(:, :, sample) = 0.0_wp
-      do i = 1, self%n
-         do k = 1, observables
-            trajectory%value(:, k, sample) = trajectory%value(:, k, sample) + self%observation(k, i)*self%position(:, i)
-            trajectory%rate(:, k, sample) = trajectory%rate(:, k, sample) + self%observation(k, i)*self%velocity(:, i)
-         end do
-      end do
+      n = self%equations%n
+      orbit%samples = sample
+      orbit%time(sample) = self%period*real(sample, wp)/real(self%steps, wp)
+      orbit%weight(sample) = merge(0.5_wp, 1.0_wp, sample == 0 .or. sample == self%steps)/real(self%steps, wp)
+      orbit%value(:, sample) = matmul(self%equations%observation, state(:n))
+      orbit%rate(:, sample) = matmul(self%equations%observation, state(n + 1:))
+      orbit%acceleration(:, sample) = matmul(self%acceleration, state) + self%acceleration_force*force
    end subroutine record
+
+   !> The state from the coordinates of the equations of motion.
+   pure function state_from_coordinates(self, position, velocity) result(state)
+      !> Map.
+      class(newmark_map), intent(in) :: self
+      !> Deviation from the static equilibrium, shape (n).
+      real(wp), intent(in) :: position(:)
+      !> Its rate, shape (n).
+      real(wp), intent(in) :: velocity(:)
+      !> State, shape (size).
+      real(wp), allocatable :: state(:)
+
+      allocate (state(self%size))
+      state(:size(position)) = position
+      state(size(position) + 1:) = velocity
+   end function state_from_coordinates
+
+   !> The coordinates of the equations of motion from the state.
+   pure subroutine coordinates_from_state(self, state, position, velocity)
+      !> Map.
+      class(newmark_map), intent(in) :: self
+      !> State, shape (size).
+      real(wp), intent(in) :: state(:)
+      !> Deviation from the static equilibrium, shape (n).
+      real(wp), allocatable, intent(out) :: position(:)
+      !> Its rate, shape (n).
+      real(wp), allocatable, intent(out) :: velocity(:)
+
+      position = state(:self%equations%n)
+      velocity = state(self%equations%n + 1:)
+   end subroutine coordinates_from_state
 
 end module spurflex_integrate_newmark

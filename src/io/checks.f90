@@ -34,7 +34,7 @@ contains
       call check_axis(table, 'speed', faults)
       call check_axis(table, 'stiffness', faults)
       call check_points(table, faults)
-      call check_newmark(table, faults)
+      call check_solver(table, faults)
       call check_output(table, deck, faults)
    end subroutine check_values
 
@@ -184,15 +184,24 @@ contains
          '; allowed is at most '//to_text(most_points), faults)
    end subroutine check_points
 
-   !> Newmark's method is stable whatever the step.
-   subroutine check_newmark(table, faults)
+   !> The steps resolve a mesh period, and Newmark's method is stable whatever they are.
+   subroutine check_solver(table, faults)
       !> The values.
       type(deck_values), intent(in) :: table
       !> Faults.
       type(fault_list), intent(inout) :: faults
 
+      integer, parameter :: fewest_steps = 8
       real(wp) :: beta, gamma
+      integer :: i
 
+      if (table%known('solver', ['steps_per_period'])) then
+         if (any(table%integer_of('solver', 'steps_per_period') == [(i, i=1, fewest_steps - 1)])) then
+            call note(table, 'solver', 'steps_per_period', to_text(table%integer_of('solver', 'steps_per_period'))// &
+               ' steps resolve no mesh period; allowed is 0, which chooses them by the tolerance, or at least '// &
+               to_text(fewest_steps), faults)
+         end if
+      end if
       if (.not. table%known('solver', ['newmark_beta ', 'newmark_gamma'])) return
       beta = table%real_of('solver', 'newmark_beta')
       gamma = table%real_of('solver', 'newmark_gamma')
@@ -203,7 +212,7 @@ contains
          call note(table, 'solver', 'newmark_beta', to_text(beta)//' is stable for small steps only; allowed is at least '// &
             'newmark_gamma/2 = '//to_text(0.5_wp*gamma), faults)
       end if
-   end subroutine check_newmark
+   end subroutine check_solver
 
    !> The result file can be written and is not the deck; no product is asked for twice.
    subroutine check_output(table, deck, faults)

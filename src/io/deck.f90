@@ -3,7 +3,7 @@ module spurflex_io_deck
    use spurflex_base_error, only: error_type, fatal_error, exit_deck
    use spurflex_base_kinds, only: wp, pi
    use spurflex_base_text, only: to_text
-   use spurflex_integrate_options, only: start_rest, start_static, start_up, start_down, integrator_newmark
+   use spurflex_integrate_options, only: start_rest, start_static, start_up, start_down, integrator_newmark, integrator_collocation
    use spurflex_io_case, only: case_type
    use spurflex_io_checks, only: check_values, uses_flexible
    use spurflex_io_faults, only: fault_list, excerpt, is_control
@@ -193,7 +193,8 @@ contains
       case default
          case%solver%start = start_static
       end select
-      case%solver%integrator = integrator_newmark
+      case%solver%integrator = merge(integrator_newmark, integrator_collocation, &
+                                     table%text_of('solver', 'integrator') == 'newmark')
       case%solver%steps_per_period = table%integer_of('solver', 'steps_per_period')
       case%solver%newmark_beta = table%real_of('solver', 'newmark_beta')
       case%solver%newmark_gamma = table%real_of('solver', 'newmark_gamma')

@@ -9,7 +9,7 @@ module spurflex_io_results
    use spurflex_external_file_lock, only: acquire_lock, file_lock, release_lock
    use spurflex_external_posix, only: rename_file, sync_file
    use spurflex_io_agreement, only: share_error
-   use spurflex_io_case, only: case_type, sweep_spec
+   use spurflex_io_case, only: case_type
    use spurflex_io_hdf5, only: check, start_hdf5
    use spurflex_io_provenance, only: provenance_type
    use spurflex_io_results_check, only: check_file
@@ -64,7 +64,7 @@ contains
          call acquire_lock(results%lock, lock_path(case), error)
          if (.not. allocated(error)) call make_file(case%output%file, case, provenance, error)
       end if
-      call open_shared(results, case%output%file, case%sweep, error)
+      call open_shared(results, case, error)
    end subroutine create_results
 
    !> Open an existing result file on every rank to continue it. All ranks call this together.
@@ -89,7 +89,7 @@ contains
          call acquire_lock(results%lock, lock_path(case), error)
          if (.not. allocated(error)) call check_file(case%output%file, case, error)
       end if
-      call open_shared(results, case%output%file, case%sweep, error)
+      call open_shared(results, case, error)
    end subroutine open_results
 
    !> Close the file and remove its lock; does nothing if it is not open. All ranks call this together.
@@ -239,13 +239,11 @@ contains
    end subroutine make_file
 
    !> Open the file on every rank, unless rank 0 found that it should not be; then leave nothing open and no lock.
-   subroutine open_shared(results, path, sweep, error)
+   subroutine open_shared(results, case, error)
       !> The file, with its communicator.
       type(results_file), intent(inout) :: results
-      !> Path of the file.
-      character(len=*), intent(in) :: path
-      !> Grid asked for.
-      type(sweep_spec), intent(in) :: sweep
+      !> What is computed.
+      type(case_type), intent(in) :: case
       !> This rank's error before, the common error after.
       type(error_type), allocatable, intent(inout) :: error
 
@@ -253,6 +251,7 @@ contains
       integer(hid_t) :: access
       integer :: ierr(4)
 
+      associate (sweep => case%sweep, path => case%output%file)
       call share_error(results%comm, error)
       if (.not. allocated(error)) then
          call h5pcreate_f(H5P_FILE_ACCESS_F, access, ierr(1))
@@ -264,9 +263,9 @@ contains
          call share_error(results%comm, error)
       end if
       if (.not. allocated(error)) then
-         call open_set(results%rigid, results%file, rigid_variables(sweep), [sweep%speed_count], error)
+         call open_set(results%rigid, results%file, rigid_variables(sweep, case%output%products), [sweep%speed_count], error)
          if (.not. allocated(error)) then
-            call open_set(results%flexible, results%file, flexible_variables(sweep), &
+            call open_set(results%flexible, results%file, flexible_variables(sweep, case%output%products), &
                [sweep%speed_count, sweep%stiffness_count], error)
          end if
          if (allocated(error)) then
@@ -275,6 +274,7 @@ contains
          end if
          call share_error(results%comm, error)
       end if
+      end associate
       if (allocated(error)) call close_results(results, next)
    end subroutine open_shared
 

@@ -85,7 +85,8 @@ contains
          call create_axis(file, axes(i), scales(i), error)
          if (allocated(error)) return
       end do
-      allocate (variables, source=[flexible_variables(case%sweep), rigid_variables(case%sweep)])
+      allocate (variables, source=[flexible_variables(case%sweep, case%output%products), &
+                                    rigid_variables(case%sweep, case%output%products)])
       do i = 1, size(variables)
          call create_variable(file, variables(i), axes, scales, error)
          if (allocated(error)) return

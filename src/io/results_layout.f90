@@ -4,11 +4,13 @@
 !> and `get_values` and `set_values` a case of the same name. An axis is one more entry in `axes_of`.
 module spurflex_io_results_layout
    use spurflex_base_kinds, only: wp
+   use spurflex_base_text, only: to_text
    use spurflex_io_axes, only: speeds, stiffnesses
    use spurflex_io_case, only: sweep_spec
    use spurflex_measure_response, only: contact_both_flanks, contact_kept, contact_lost, motion_chaotic, &
-      motion_quasi_periodic, motion_unresolved, response, status_diverged, status_missing, status_not_settled, &
-      status_settled
+      motion_quasi_periodic, motion_unresolved, response, status_diverged, status_inaccurate, status_missing, &
+      status_not_settled, status_settled
+   use spurflex_steady_sections, only: longest_period
    implicit none
    private
 
@@ -22,6 +24,8 @@ module spurflex_io_results_layout
    integer, parameter :: units_length = 8
    !> Longest description.
    integer, parameter :: long_name_length = 80
+   !> Longest word for a product.
+   integer, parameter :: product_length = 16
    !> Most dimensions of a variable.
    integer, parameter :: most_dimensions = 2
 
@@ -52,6 +56,8 @@ module spurflex_io_results_layout
       integer :: kind
       !> Needs both the rigid and the flexible support.
       logical :: compares
+      !> Product that a deck must ask for, blank if it is always there.
+      character(len=product_length) :: product
       !> Description for people.
       character(len=long_name_length) :: long_name
    end type quantity_type
@@ -74,19 +80,26 @@ module spurflex_io_results_layout
 
    !> Every quantity, in the order of writing: the status goes last, as it says that the others are there.
    type(quantity_type), parameter :: quantities(*) = [ &
-      quantity_type('y1_amplitude', 'm', real_value, .false., 'half the peak-to-peak of the driving gear in y'), &
-      quantity_type('y1_rms', 'm', real_value, .false., 'root mean square of y1 about its mean'), &
-      quantity_type('y1_max', 'm', real_value, .false., 'largest displacement of the driving gear in y'), &
-      quantity_type('y1_min', 'm', real_value, .false., 'smallest displacement of the driving gear in y'), &
-      quantity_type('bearing1_deformation_max', 'm', real_value, .false., 'largest deformation of the driving bearing'), &
-      quantity_type('bearing2_deformation_max', 'm', real_value, .false., 'largest deformation of the driven bearing'), &
-      quantity_type('eta1', 'percent', real_value, .true., 'change of bearing1_deformation_max by the flexible support'), &
-      quantity_type('eta2', 'percent', real_value, .true., 'change of bearing2_deformation_max by the flexible support'), &
-      quantity_type('error_estimate', '1', real_value, .false., 'estimated relative error of y1_amplitude'), &
-      quantity_type('motion', '1', motion_flag, .false., 'class of the steady motion'), &
-      quantity_type('periods_integrated', '1', plain_integer, .false., 'mesh periods integrated'), &
-      quantity_type('contact', '1', contact_flag, .false., 'contact of the teeth'), &
-      quantity_type('status', '1', status_flag, .false., 'state of the computation')]
+      quantity_type('y1_amplitude', 'm', real_value, .false., '', 'half the peak-to-peak of the driving gear in y'), &
+      quantity_type('y1_rms', 'm', real_value, .false., '', 'root mean square of y1 about its mean'), &
+      quantity_type('y1_max', 'm', real_value, .false., '', 'largest displacement of the driving gear in y'), &
+      quantity_type('y1_min', 'm', real_value, .false., '', 'smallest displacement of the driving gear in y'), &
+      quantity_type('bearing1_deformation_max', 'm', real_value, .false., '', 'largest deformation of the driving bearing'), &
+      quantity_type('bearing2_deformation_max', 'm', real_value, .false., '', 'largest deformation of the driven bearing'), &
+      quantity_type('eta1', 'percent', real_value, .true., '', 'change of bearing1_deformation_max by the flexible support'), &
+      quantity_type('eta2', 'percent', real_value, .true., '', 'change of bearing2_deformation_max by the flexible support'), &
+      quantity_type('error_estimate', '1', real_value, .false., '', &
+                    'estimated relative error of the amplitude and of the bearing deformations'), &
+      quantity_type('floquet_magnitude', '1', real_value, .false., 'floquet', &
+                    'largest modulus of the Floquet multipliers over the period of the motion'), &
+      quantity_type('lyapunov_exponent', '1', real_value, .false., 'lyapunov', &
+                    'largest Lyapunov exponent per mesh period'), &
+      quantity_type('lyapunov_error', '1', real_value, .false., 'lyapunov', &
+                    'standard error of lyapunov_exponent per mesh period'), &
+      quantity_type('motion', '1', motion_flag, .false., '', 'class of the steady motion'), &
+      quantity_type('periods_integrated', '1', plain_integer, .false., '', 'mesh periods integrated'), &
+      quantity_type('contact', '1', contact_flag, .false., '', 'contact of the teeth'), &
+      quantity_type('status', '1', status_flag, .false., '', 'state of the computation')]
 
 contains
 
@@ -104,32 +117,67 @@ contains
    end function axes_of
 
    !> The variables of the rigid support, on (speed), in the order of writing.
-   pure function rigid_variables(sweep) result(variables)
+   pure function rigid_variables(sweep, products) result(variables)
       !> Grid asked for.
       type(sweep_spec), intent(in) :: sweep
+      !> Products asked for, shape (products); none if absent.
+      character(len=*), intent(in), optional :: products(:)
       !> The variables, shape (variables); none if the rigid support is not asked for.
       type(variable_type), allocatable :: variables(:)
 
       character(len=name_length) :: axes(most_dimensions)
 
       axes = [character(len=name_length) :: speed_axis, '']
-      variables = variables_of(pack(quantities, sweep%rigid .and. .not. quantities%compares), rigid_prefix, &
-         'rigid support: ', axes)
+      variables = variables_of(pack(quantities, sweep%rigid .and. .not. quantities%compares &
+                                    .and. asked_for(quantities, products)), &
+         rigid_prefix, 'rigid support: ', axes)
    end function rigid_variables
 
    !> The variables of the flexible support, on (support_stiffness, speed) in C order, in the order of writing.
-   pure function flexible_variables(sweep) result(variables)
+   pure function flexible_variables(sweep, products) result(variables)
       !> Grid asked for.
       type(sweep_spec), intent(in) :: sweep
+      !> Products asked for, shape (products); none if absent.
+      character(len=*), intent(in), optional :: products(:)
       !> The variables, shape (variables); none if the flexible support is not asked for.
       type(variable_type), allocatable :: variables(:)
 
       character(len=name_length) :: axes(most_dimensions)
 
       axes = [character(len=name_length) :: speed_axis, stiffness_axis]
-      variables = variables_of(pack(quantities, sweep%flexible .and. (sweep%rigid .or. .not. quantities%compares)), &
-         '', '', axes)
+      variables = variables_of(pack(quantities, sweep%flexible .and. (sweep%rigid .or. .not. quantities%compares) &
+                                      .and. asked_for(quantities, products)), '', '', axes)
    end function flexible_variables
+
+   !> A quantity is always there, or belongs to a product that is asked for.
+   elemental function is_product(quantity, product) result(it_is)
+      !> The quantity.
+      type(quantity_type), intent(in) :: quantity
+      !> The product, or blank.
+      character(len=*), intent(in) :: product
+      !> The quantity belongs to it.
+      logical :: it_is
+
+      it_is = quantity%product == product
+   end function is_product
+
+   !> Which quantities are asked for.
+   pure function asked_for(chosen, products) result(asked)
+      !> Quantities, shape (n).
+      type(quantity_type), intent(in) :: chosen(:)
+      !> Products asked for, shape (products); none if absent.
+      character(len=*), intent(in), optional :: products(:)
+      !> Shape (n).
+      logical :: asked(size(chosen))
+
+      integer :: i
+
+      asked = is_product(chosen, '')
+      if (.not. present(products)) return
+      do i = 1, size(products)
+         asked = asked .or. is_product(chosen, products(i))
+      end do
+   end function asked_for
 
    !> Variables for quantities.
    pure function variables_of(chosen, prefix, description, axes) result(variables)
@@ -169,12 +217,15 @@ contains
 
       select case (kind)
       case (motion_flag)
-         values = [motion_unresolved, (i, i=1, 8), motion_quasi_periodic, motion_chaotic]
-         meanings = 'unresolved period_1 period_2 period_3 period_4 period_5 period_6 period_7 period_8 ' &
-            //'quasi_periodic chaotic'
+         values = [motion_unresolved, (i, i=1, longest_period), motion_quasi_periodic, motion_chaotic]
+         meanings = 'unresolved'
+         do i = 1, longest_period
+            meanings = meanings//' period_'//to_text(i)
+         end do
+         meanings = meanings//' quasi_periodic chaotic'
       case (status_flag)
-         values = [status_missing, status_settled, status_not_settled, status_diverged]
-         meanings = 'missing settled not_settled diverged'
+         values = [status_missing, status_settled, status_not_settled, status_diverged, status_inaccurate]
+         meanings = 'missing settled not_settled diverged inaccurate'
       case (contact_flag)
          values = [contact_kept, contact_lost, contact_both_flanks]
          meanings = 'never_lost lost both_flanks'
@@ -216,6 +267,12 @@ contains
          reals = eta(2, :)
       case ('error_estimate')
          reals = responses%error_estimate
+      case ('floquet_magnitude')
+         reals = responses%floquet_magnitude
+      case ('lyapunov_exponent')
+         reals = responses%lyapunov_exponent
+      case ('lyapunov_error')
+         reals = responses%lyapunov_error
       case ('motion')
          integers = responses%motion
       case ('periods_integrated')
@@ -253,6 +310,12 @@ contains
          responses%bearing_deformation_max(2) = reals
       case ('error_estimate')
          responses%error_estimate = reals
+      case ('floquet_magnitude')
+         responses%floquet_magnitude = reals
+      case ('lyapunov_exponent')
+         responses%lyapunov_exponent = reals
+      case ('lyapunov_error')
+         responses%lyapunov_error = reals
       case ('motion')
          responses%motion = integers
       case ('periods_integrated')

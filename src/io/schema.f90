@@ -185,24 +185,28 @@ contains
          meaning='Number of support stiffnesses, evenly spaced in their logarithm.'), &
          key_spec('sweep', 'start', kind_word, need=need_never, default='''static''', words='rest static up down', &
          meaning='Start: zero state, static equilibrium, or on from the next lower (up) or higher (down) speed.'), &
-         key_spec('solver', 'integrator', kind_word, need=need_never, default='''newmark''', words='newmark', &
-         meaning='Time integration: Newmark-beta with constant steps.'), &
+         key_spec('solver', 'integrator', kind_word, need=need_never, default='''newmark''', words='newmark collocation', &
+         meaning='Time integration: Newmark-beta, or exponential collocation of order eight with located crossings.'), &
          key_spec('solver', 'steps_per_period', kind_integer, need=need_never, default=to_text(solver%steps_per_period), &
-         range=range_type(8.0_wp, 1048576.0_wp), meaning='Time steps per mesh period.'), &
+         range=range_type(0.0_wp, 1048576.0_wp), &
+         meaning='Time steps per mesh period, 8 or more; 0: as many as the tolerance needs, point by point.'), &
          key_spec('solver', 'newmark_beta', kind_real, need=need_never, default=to_text(solver%newmark_beta), &
          range=range_type(0.0_wp, 1.0_wp, above=.true.), meaning='Newmark''s beta; stable for 2 beta >= gamma.'), &
          key_spec('solver', 'newmark_gamma', kind_real, need=need_never, default=to_text(solver%newmark_gamma), &
          range=range_type(0.0_wp, 1.0_wp), meaning='Newmark''s gamma; stable from 0.5, above which it damps.'), &
          key_spec('solver', 'tolerance', kind_real, need=need_never, default=to_text(solver%tolerance), &
-         range=range_type(1.0e-12_wp, 0.1_wp), meaning='Relative error of the amplitude that is asked for.'), &
+         range=range_type(1.0e-12_wp, 0.1_wp), &
+         meaning='Relative error of amplitude and bearing deformation that is promised, unless steps_per_period is given.'), &
          key_spec('solver', 'max_periods', kind_integer, need=need_never, default=to_text(solver%max_periods), &
-         range=range_type(16.0_wp, 1.0e9_wp), meaning='Most mesh periods until a point is given up as not settled.'), &
+         range=range_type(16.0_wp, 1.0e9_wp), &
+         meaning='Most mesh periods of transient; what is not periodic by then is told apart by its Lyapunov exponent.'), &
          key_spec('solver', 'measured_periods', kind_integer, need=need_never, default=to_text(solver%measured_periods), &
          range=range_type(1.0_wp, 1.0e7_wp), meaning='Mesh periods over which a motion that is not periodic is measured.'), &
          key_spec('output', 'file', kind_text, need=need_never, default='name of the deck + .h5', derived=.true., &
          meaning='Result file, relative to the working folder.'), &
-         key_spec('output', 'products', kind_word, need=need_never, default='''map''', most=most_products, words='map', &
-         meaning='What is written: the map of the steady response over the grid.')]
+         key_spec('output', 'products', kind_word, need=need_never, default='''map''', most=most_products, &
+         words='map floquet lyapunov', &
+         meaning='What is written: map, the steady response, always; floquet, lyapunov: multipliers and exponents.')]
    end function run_keys
 
    !> Position of a key in the table.

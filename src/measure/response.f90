@@ -2,13 +2,13 @@
 module spurflex_measure_response
    use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
    use spurflex_base_kinds, only: wp
-   use spurflex_steady_outcome, only: status_missing, status_settled, status_not_settled, status_diverged, &
+   use spurflex_steady_outcome, only: status_missing, status_settled, status_not_settled, status_diverged, status_inaccurate, &
       contact_kept, contact_lost, contact_both_flanks, motion_unresolved, motion_quasi_periodic, motion_chaotic
    implicit none
    private
 
    public :: response, empty_response, nan
-   public :: status_missing, status_settled, status_not_settled, status_diverged
+   public :: status_missing, status_settled, status_not_settled, status_diverged, status_inaccurate
    public :: contact_kept, contact_lost, contact_both_flanks
    public :: motion_unresolved, motion_quasi_periodic, motion_chaotic
 
@@ -26,11 +26,15 @@ module spurflex_measure_response
       real(wp) :: bearing_deformation_max(2)
       !> Estimated relative error of the amplitude [-].
       real(wp) :: error_estimate
-      !> Mesh periods of the motion (1..8), or `motion_...`.
+      !> Largest modulus of the Floquet multipliers over the period of the motion [-].
+      real(wp) :: floquet_magnitude
+      !> Largest Lyapunov exponent and its standard error [1/mesh period].
+      real(wp) :: lyapunov_exponent, lyapunov_error
+      !> Mesh periods of the motion, or `motion_...`.
       integer :: motion
       !> `status_...`.
       integer :: status
-      !> Mesh periods integrated for the transient.
+      !> Mesh periods integrated to find the motion.
       integer :: periods_integrated
       !> `contact_...`.
       integer :: contact
@@ -57,6 +61,9 @@ contains
       empty%y1_min = nan()
       empty%bearing_deformation_max = nan()
       empty%error_estimate = nan()
+      empty%floquet_magnitude = nan()
+      empty%lyapunov_exponent = nan()
+      empty%lyapunov_error = nan()
       empty%motion = motion_unresolved
       empty%status = status_missing
       empty%periods_integrated = 0

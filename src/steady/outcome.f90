@@ -1,22 +1,24 @@
-!> What the steady-state solution of a point ends with.
+!> What the search for the steady motion of a point ends with.
 module spurflex_steady_outcome
    use spurflex_base_kinds, only: wp
    implicit none
    private
 
-   public :: steady_outcome
-   public :: status_missing, status_settled, status_not_settled, status_diverged
+   public :: steady_motion
+   public :: status_missing, status_settled, status_not_settled, status_diverged, status_inaccurate
    public :: contact_kept, contact_lost, contact_both_flanks
    public :: motion_unresolved, motion_quasi_periodic, motion_chaotic
 
    !> The point has not been computed yet.
    integer, parameter :: status_missing = 0
-   !> The motion repeats within the tolerance.
+   !> The steady motion is known: a stable periodic motion that the start leads to, or a class of motion that is not periodic.
    integer, parameter :: status_settled = 1
-   !> The most periods allowed went by before the motion settled; measured all the same.
+   !> The most periods allowed went by before the motion could be told; measured all the same.
    integer, parameter :: status_not_settled = 2
    !> The state became infinite or not a number.
    integer, parameter :: status_diverged = 3
+   !> The steady motion is known, but its estimated error exceeds the tolerance, with the steps given or with the most there are.
+   integer, parameter :: status_inaccurate = 4
 
    !> The teeth never part.
    integer, parameter :: contact_kept = 0
@@ -27,25 +29,25 @@ module spurflex_steady_outcome
 
    !> The motion class could not be told.
    integer, parameter :: motion_unresolved = 0
-   !> Two or more incommensurate frequencies.
+   !> Not periodic, without sensitive dependence on the state.
    integer, parameter :: motion_quasi_periodic = 20
-   !> Sensitive dependence on the state.
+   !> Sensitive dependence on the state: the largest Lyapunov exponent is positive.
    integer, parameter :: motion_chaotic = 30
 
-   !> How the search for the steady motion of one point ended.
-   type :: steady_outcome
-      !> Mesh periods of the motion (1..8), or `motion_...`.
+   !> The steady motion of one point.
+   type :: steady_motion
+      !> Mesh periods after which the motion repeats, or `motion_...`.
       integer :: motion = motion_unresolved
       !> `status_...`.
       integer :: status = status_missing
-      !> Mesh periods integrated before the motion was measured.
+      !> Mesh periods integrated to find it.
       integer :: periods_integrated = 0
-      !> `contact_...` over the measured periods.
-      integer :: contact = contact_kept
-      !> Deviation from the static equilibrium at the last section, shape (n).
-      real(wp), allocatable :: position(:)
-      !> Its rate, shape (n).
-      real(wp), allocatable :: velocity(:)
-   end type steady_outcome
+      !> Largest modulus of the Floquet multipliers over the period of the motion; NaN where it is not periodic [-].
+      real(wp) :: floquet_magnitude = 0.0_wp
+      !> Largest Lyapunov exponent and its standard error [1/mesh period].
+      real(wp) :: lyapunov_exponent = 0.0_wp, lyapunov_error = 0.0_wp
+      !> State of the period map at a section of the motion, shape (size).
+      real(wp), allocatable :: state(:)
+   end type steady_motion
 
 end module spurflex_steady_outcome

@@ -5,21 +5,18 @@ module spurflex_sweep_driver
    use spurflex_base_error, only: error_type, exit_complete, exit_failed_points
    use spurflex_base_kinds, only: wp
    use spurflex_base_text, only: to_text, fixed_text
-   use spurflex_integrate_newmark, only: newmark_type, new_newmark
+   use spurflex_external_posix, only: remove_file
    use spurflex_io_agreement, only: share_error
-   use spurflex_io_axes, only: speeds
    use spurflex_io_case, only: case_type
    use spurflex_io_deck, only: read_deck, parse_deck
    use spurflex_io_log, only: logger
    use spurflex_io_provenance, only: provenance_type, collect_provenance
    use spurflex_io_results, only: results_file, create_results, open_results, close_results, read_status, read_rigid
    use spurflex_measure_response, only: response, status_missing, status_diverged
-   use spurflex_model_equations, only: equations_type, new_equations
-   use spurflex_model_parameters, only: operating_point, support_rigid, support_flexible
-   use spurflex_steady_transient, only: solve_by_transient
-   use spurflex_sweep_plan, only: chunk_type, plan_row, plan_grid, describe_plan
+   use spurflex_sweep_attendance, only: outcome_text
+   use spurflex_sweep_plan, only: plan_row, plan_grid, describe_plan
    use spurflex_sweep_schedule, only: outcomes
-   use spurflex_sweep_stream, only: grid_stream, open_stream, close_stream, no_twin
+   use spurflex_sweep_worker, only: work_on_chunks, no_twin
    implicit none
    private
 
@@ -71,7 +68,7 @@ contains
       type(results_file), target :: results
       integer, allocatable :: rigid_status(:), status(:, :)
       real(wp), allocatable :: rigid_deformation(:, :)
-      integer :: ranks, total(outcomes)
+      integer :: ranks, total(outcomes), finished(outcomes)
 
       code = exit_complete
       call mpi_comm_size(comm, ranks)
@@ -87,16 +84,19 @@ contains
       if (any(rigid_status == status_missing)) then
          call log%begin('rigid support: '//to_text(count(rigid_status == status_missing))//' points on ' &
                         //to_text(ranks)//' ranks')
-         call solve_chunks(case, plan_row(case, rigid_status, ranks), support_rigid, comm, results, log, &
-                           rigid_deformation, total, error)
+         call work_on_chunks(case, plan_row(case, rigid_status, ranks), comm, results, log, rigid_deformation, finished, error)
+         if (allocated(error)) error%alone = .true.
          if (allocated(error)) return
+         total = total + finished
+         call mpi_allreduce(MPI_IN_PLACE, rigid_deformation, size(rigid_deformation), MPI_DOUBLE_PRECISION, MPI_MIN, comm)
       end if
       if (any(status == status_missing)) then
          call log%begin('flexible support: '//to_text(count(status == status_missing))//' points on ' &
                         //to_text(ranks)//' ranks')
-         call solve_chunks(case, plan_grid(case, status, ranks), support_flexible, comm, results, log, &
-                           rigid_deformation, total, error)
+         call work_on_chunks(case, plan_grid(case, status, ranks), comm, results, log, rigid_deformation, finished, error)
+         if (allocated(error)) error%alone = .true.
          if (allocated(error)) return
+         total = total + finished
       end if
       if (sum(total) == 0) call log%say('nothing to do: every point of '//case%output%file//' is there')
       total(status_diverged) = total(status_diverged) + count(rigid_status == status_diverged) &
@@ -105,8 +105,7 @@ contains
       if (total(status_diverged) > 0) code = exit_failed_points
       call close_results(results, error)
       if (allocated(error)) return
-      call log%say('done in '//fixed_text(log%elapsed(), 2)//' s: '//to_text(total(1))//' points settled, ' &
-                   //to_text(total(2))//' not settled, '//to_text(total(3))//' diverged; results in '//case%output%file)
+      call log%say('done in '//fixed_text(log%elapsed(), 2)//' s: '//outcome_text(total)//'; results in '//case%output%file)
    end subroutine run_case
 
    !> Open the result file: continue an existing one of the same case, else make a new one.
@@ -123,7 +122,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       type(provenance_type) :: provenance
-      integer :: rank, unit, stat
+      integer :: rank
       logical :: exists(1)
 
       call collect_provenance(provenance, error)
@@ -133,11 +132,12 @@ contains
       if (rank == 0) then
          inquire (file=case%output%file, exist=exists(1))
          if (exists(1) .and. fresh) then
-            open (newunit=unit, file=case%output%file, status='old', iostat=stat)
-            if (stat == 0) close (unit, status='delete', iostat=stat)
+            call remove_file(case%output%file, error)
             exists(1) = .false.
          end if
       end if
+      call share_error(comm, error)
+      if (allocated(error)) return
       call mpi_bcast(exists, 1, MPI_LOGICAL, 0, comm)
       if (exists(1)) then
          call open_results(results, case, comm, error)
@@ -177,51 +177,5 @@ contains
          rigid_deformation(:, i) = rigid(i)%bearing_deformation_max
       end do
    end subroutine find_missing
-
-   !> Solve the points of some chunks, all of one support kind. All ranks call this together.
-   subroutine solve_chunks(case, chunks, support, comm, results, log, rigid_deformation, total, error)
-      !> Case.
-      type(case_type), intent(in) :: case
-      !> The chunks, the same on every rank.
-      type(chunk_type), intent(in) :: chunks(:)
-      !> `support_rigid` or `support_flexible`.
-      integer, intent(in) :: support
-      !> The ranks.
-      type(MPI_Comm), intent(in) :: comm
-      !> Open result file.
-      type(results_file), intent(in), target :: results
-      !> Logger.
-      type(logger), intent(in), target :: log
-      !> Rigid twins, shape (2, speed): filled in on a rigid support, used on a flexible one.
-      real(wp), allocatable, intent(inout) :: rigid_deformation(:, :)
-      !> Points by outcome, counted up on rank 0, shape (outcomes).
-      integer, intent(inout) :: total(:)
-      !> Set where the run fails.
-      type(error_type), allocatable, intent(out) :: error
-
-      type(grid_stream) :: stream
-      type(newmark_type) :: integrator
-      type(equations_type) :: any_point
-      integer :: finished(outcomes)
-      real(wp) :: speed(case%sweep%speed_count)
-
-      speed = speeds(case%sweep)
-      any_point = new_equations(case%gears, case%box, case%load, &
-                                operating_point(support, speed(1), max(case%sweep%stiffness_first, 1.0_wp)))
-      integrator = new_newmark(any_point, case%solver)
-      if (allocated(rigid_deformation)) stream%rigid_deformation = rigid_deformation
-      call open_stream(stream, case, chunks, comm, results, log)
-      call solve_by_transient(integrator, case%solver, stream, error)
-      if (allocated(error)) then
-         error%alone = .true.
-         return
-      end if
-      call close_stream(stream, finished)
-      total = total + finished
-      if (support == support_rigid .and. allocated(rigid_deformation)) then
-         rigid_deformation = stream%rigid_deformation
-         call mpi_allreduce(MPI_IN_PLACE, rigid_deformation, size(rigid_deformation), MPI_DOUBLE_PRECISION, MPI_MIN, comm)
-      end if
-   end subroutine solve_chunks
 
 end module spurflex_sweep_driver

@@ -134,8 +134,10 @@ contains
       character(len=:), allocatable :: text
 
       character(len=*), parameter :: newline = new_line('a')
-      character(len=:), allocatable :: start
+      character(len=:), allocatable :: start, steps
 
+      steps = 'as many as a relative error of '//to_text(case%solver%tolerance)//' needs'
+      if (case%solver%steps_per_period > 0) steps = to_text(case%solver%steps_per_period)//' per mesh period'
       associate (sweep => case%sweep)
          text = 'speeds: '//to_text(sweep%speed_count)//' from '//to_text(sweep%speed_first)//' to ' &
                 //to_text(sweep%speed_last)//' rev/min'
@@ -159,8 +161,8 @@ contains
       case default
          start = 'from the next higher speed, row by row'
       end select
-      text = text//newline//'start: '//start//newline//'steps: '//to_text(case%solver%steps_per_period) &
-             //' per mesh period, at most '//to_text(case%solver%max_periods)//' periods a point'
+      text = text//newline//'start: '//start//newline//'steps: '//steps//'; at most '//to_text(case%solver%max_periods) &
+             //' mesh periods of transient a point'
    end function describe_plan
 
 end module spurflex_sweep_plan

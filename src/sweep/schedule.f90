@@ -5,14 +5,14 @@
 module spurflex_sweep_schedule
    use mpi_f08, only: MPI_Comm, MPI_Request, MPI_Status, MPI_COMM_NULL, MPI_REQUEST_NULL, MPI_INTEGER, MPI_ANY_SOURCE, &
       MPI_ANY_TAG, MPI_STATUS_IGNORE, mpi_comm_rank, mpi_comm_size, mpi_iprobe, mpi_probe, mpi_irecv, mpi_recv, mpi_send, &
-      mpi_test, mpi_wait
+      mpi_wait
    implicit none
    private
 
    public :: scheduler, new_scheduler, outcomes
 
-   !> Kinds of outcome that are counted: settled, not settled, diverged.
-   integer, parameter :: outcomes = 3
+   !> Kinds of outcome that are counted, by status: settled, not settled, diverged, inaccurate.
+   integer, parameter :: outcomes = 4
 
    integer, parameter :: tag_request = 1, tag_last = 2, tag_assign = 3
    integer, parameter :: no_chunk = 0
@@ -67,18 +67,14 @@ contains
       if (self%rank /= 0) call request(self)
    end subroutine new_scheduler
 
-   !> Ask for a chunk.
-   subroutine take(self, may_wait, chunk, available)
+   !> Ask for a chunk; waits for the answer.
+   subroutine take(self, chunk, available)
       !> Scheduler.
       class(scheduler), intent(inout) :: self
-      !> Wait for the answer.
-      logical, intent(in) :: may_wait
       !> The chunk.
       integer, intent(out) :: chunk
       !> There is one.
       logical, intent(out) :: available
-
-      logical :: arrived
 
       chunk = no_chunk
       available = .false.
@@ -87,13 +83,7 @@ contains
          call hand_out(self, chunk)
          available = chunk /= no_chunk
       else if (.not. self%exhausted) then
-         if (may_wait) then
-            call mpi_wait(self%pending, MPI_STATUS_IGNORE)
-            arrived = .true.
-         else
-            call mpi_test(self%pending, arrived, MPI_STATUS_IGNORE)
-         end if
-         if (.not. arrived) return
+         call mpi_wait(self%pending, MPI_STATUS_IGNORE)
          chunk = self%answer(1)
          available = chunk /= no_chunk
          self%exhausted = .not. available

@@ -1,0 +1,406 @@
+!> Exponential collocation: order eight, with every crossing of the contact borders located.
+!>
+!> The modes of the linear part are carried exactly; the one scalar that drives them is collocated at five Lobatto points a
+!> step (`spurflex_integrate_exponential`). Between two crossings the mesh is on one branch, N_i = alpha_i x_i + gamma_i at
+!> every point, so that a step is one small linear system and nothing iterates. A step in which the deflection leaves its
+!> branch is cut at the crossing.
+module spurflex_integrate_collocation
+   use spurflex_base_error, only: error_type
+   use spurflex_base_kinds, only: wp, pi
+   use spurflex_integrate_branch, only: branch_of, first_crossing, refine_crossing, most_crossings
+   use spurflex_integrate_exponential, only: step_coefficients, set_step, node, nodes
+   use spurflex_integrate_mesh_table, only: mesh_points, set_mesh_points, branch_law
+   use spurflex_integrate_period_map, only: period_map, orbit_type, observables, reserve_orbit
+   use spurflex_model_equations, only: equations_type
+   use spurflex_model_modal, only: modal_system, new_modal_system
+   implicit none
+   private
+
+   public :: collocation_map
+
+   !> Weights of the Lobatto points in an integral over the step.
+   real(wp), parameter :: quadrature(nodes) = [0.05_wp, 49.0_wp/180.0_wp, 16.0_wp/45.0_wp, 49.0_wp/180.0_wp, 0.05_wp]
+
+   !> Period map by exponential collocation. The state holds the real parts of the modes, then the imaginary parts.
+   type, extends(period_map) :: collocation_map
+      private
+      !> Equations of motion of the point.
+      type(equations_type) :: equations
+      !> Their modes.
+      type(modal_system), public :: modal
+      !> A whole step, the two parts of a step that is cut.
+      type(step_coefficients) :: whole, part
+      !> Mesh at the points of every whole step, shape (steps).
+      type(mesh_points), allocatable :: table(:)
+   contains
+      procedure :: load => load_collocation
+      procedure :: advance => advance_collocation
+      procedure :: to_state => modes_from_coordinates
+      procedure :: from_state => coordinates_from_modes
+   end type collocation_map
+
+contains
+
+   !> Take an operating point and a number of steps per period.
+   subroutine load_collocation(self, equations, steps, error)
+      !> Map.
+      class(collocation_map), intent(inout) :: self
+      !> Equations of motion of the point.
+      type(equations_type), intent(in) :: equations
+      !> Steps per mesh period.
+      integer, intent(in) :: steps
+      !> Set where the modes cannot be found.
+      type(error_type), allocatable, intent(out) :: error
+
+      real(wp) :: h
+      integer :: s, k
+
+      if (.not. same_support(self%equations, equations)) then
+         call new_modal_system(equations, self%modal, error)
+         if (allocated(error)) return
+         if (allocated(self%whole%carry_re)) deallocate (self%whole%carry_re, self%whole%carry_im, self%whole%taken_re, &
+                                                         self%whole%taken_im)
+         if (allocated(self%part%carry_re)) deallocate (self%part%carry_re, self%part%carry_im, self%part%taken_re, &
+                                                        self%part%taken_im)
+         self%size = 2*self%modal%modes
+         if (allocated(self%weight)) deallocate (self%weight, self%deflection_weight)
+         allocate (self%weight(self%size), self%deflection_weight(self%size), source=1.0_wp)
+         do k = 1, self%modal%modes
+            self%weight([k, self%modal%modes + k]) = max(1.0_wp, maxval(abs(self%modal%observation(:, k))))
+         end do
+      end if
+      self%equations = equations
+      self%half_backlash = equations%mesh%half_backlash
+      self%period = 2.0_wp*pi/equations%frequency
+      h = self%period/real(steps, wp)
+      call set_step(self%modal, h, self%whole)
+      if (steps /= self%steps .or. .not. allocated(self%table)) then
+         if (allocated(self%table)) deallocate (self%table)
+         allocate (self%table(steps))
+      end if
+      self%steps = steps
+      do s = 1, steps
+         call set_mesh_points(equations, h*real(s - 1, wp), h, self%table(s))
+      end do
+   end subroutine load_collocation
+
+   !> Two points have the same linear part, whatever their speeds.
+   pure function same_support(a, b) result(same)
+      !> Equations of motion of both.
+      type(equations_type), intent(in) :: a, b
+      !> The modes of one are those of the other.
+      logical :: same
+
+      same = a%n == b%n
+      if (same) same = .not. (any(abs(a%stiffness - b%stiffness) > 0.0_wp) .or. any(abs(a%damping - b%damping) > 0.0_wp) &
+                              .or. any(abs(a%mass - b%mass) > 0.0_wp) .or. any(abs(a%direction - b%direction) > 0.0_wp) &
+                              .or. abs(a%mesh%mean_stiffness - b%mesh%mean_stiffness) > 0.0_wp &
+                              .or. abs(a%mesh%damping - b%mesh%damping) > 0.0_wp)
+   end function same_support
+
+   !> Advance a state by one mesh period.
+   subroutine advance_collocation(self, state, tangents, orbit)
+      !> Map.
+      class(collocation_map), intent(inout) :: self
+      !> State at the section, shape (size).
+      real(wp), intent(inout) :: state(:)
+      !> Tangents that see the same contact, one in a row, shape (tangents, size).
+      real(wp), intent(inout), optional :: tangents(:, :)
+      !> If present, the period is recorded.
+      type(orbit_type), intent(inout), optional :: orbit
+
+      type(mesh_points) :: mesh
+      real(wp) :: force(nodes), shift(nodes), alpha(nodes), start, h, cut
+      integer :: branch, next, s, crossings
+      logical :: is_cut
+
+      h = self%whole%length
+      self%smallest_deflection = huge(1.0_wp)
+      self%largest_deflection = -huge(1.0_wp)
+      if (present(orbit)) then
+         call reserve_orbit(orbit, self%steps*(most_crossings + 1)*(nodes - 1))
+         orbit%samples = 0
+         orbit%weight = 0.0_wp
+      end if
+      branch = branch_of(self%table(1)%deflection(1) + sum(state(:self%modal%modes)), self%half_backlash)
+      do s = 1, self%steps
+         call solve_step(self%whole, self%table(s), branch, state, alpha, force, shift)
+         is_cut = .false.
+         if (leaves(branch)) then
+            is_cut = .true.
+            start = 0.0_wp
+            mesh = self%table(s)
+            do crossings = 1, most_crossings
+               call first_crossing(branch, mesh%deflection + shift, self%half_backlash, cut, next)
+               if (next == branch) exit
+               call cut_at_crossing()
+               branch = next
+               start = start + self%part%length
+               if (start >= h*(1.0_wp - epsilon(1.0_wp))) exit
+               call set_step(self%modal, h - start, self%part)
+               call set_mesh_points(self%equations, h*real(s - 1, wp) + start, h - start, mesh)
+               call solve_step(self%part, mesh, branch, state, alpha, force, shift)
+            end do
+            if (start < h*(1.0_wp - epsilon(1.0_wp))) call commit(self%part, mesh)
+         end if
+         if (.not. is_cut) call commit(self%whole, self%table(s))
+      end do
+
+   contains
+
+      !> The deflection may leave its branch within the step that was just solved.
+      logical function leaves(branch)
+         !> Branch.
+         integer, intent(in) :: branch
+
+         real(wp) :: where_left
+         integer :: reached
+
+         call first_crossing(branch, self%table(s)%deflection + shift, self%half_backlash, where_left, reached)
+         leaves = reached /= branch
+      end function leaves
+
+      !> Find the crossing exactly, commit the part of the step before it.
+      subroutine cut_at_crossing()
+         real(wp) :: whole_length, miss
+         integer :: tries
+         integer, parameter :: most_tries = 3
+
+         whole_length = merge(h, h - start, start <= 0.0_wp)
+         cut = cut*whole_length
+         do tries = 1, most_tries
+            call set_step(self%modal, cut, self%part)
+            call set_mesh_points(self%equations, h*real(s - 1, wp) + start, cut, mesh)
+            call solve_step(self%part, mesh, branch, state, alpha, force, shift)
+            call refine_crossing(branch, next, mesh%deflection + shift, self%half_backlash, whole_length, cut, miss)
+            if (abs(miss) <= epsilon(1.0_wp)**0.5_wp*abs(self%equations%static_deflection) .or. tries == most_tries) exit
+         end do
+         call commit(self%part, mesh)
+      end subroutine cut_at_crossing
+
+      !> Carry the state, and the tangents, over the step that was just solved.
+      subroutine commit(step, mesh)
+         !> Coefficients.
+         type(step_coefficients), intent(in) :: step
+         !> Mesh at its points.
+         type(mesh_points), intent(in) :: mesh
+
+         self%smallest_deflection = min(self%smallest_deflection, minval(mesh%deflection + shift))
+         self%largest_deflection = max(self%largest_deflection, maxval(mesh%deflection + shift))
+         if (present(tangents)) call carry_tangents(step, alpha, tangents)
+         if (present(orbit)) call record(self%modal, step, mesh%time, self%period, state, force, orbit)
+         call carry_state(step, force, nodes, state)
+      end subroutine commit
+
+   end subroutine advance_collocation
+
+   !> Solve one step on one branch: values of N and of x = g.q at its points.
+   pure subroutine solve_step(step, mesh, branch, state, alpha, force, shift)
+      !> Coefficients.
+      type(step_coefficients), intent(in) :: step
+      !> Mesh at its points.
+      type(mesh_points), intent(in) :: mesh
+      !> Branch: -1, 0 or 1.
+      integer, intent(in) :: branch
+      !> State at the start of the step.
+      real(wp), intent(in), contiguous :: state(:)
+      !> Derivative of N by x at each point.
+      real(wp), intent(out) :: alpha(nodes)
+      !> N and x at each point.
+      real(wp), intent(out) :: force(nodes), shift(nodes)
+
+      real(wp) :: gamma(nodes), free(nodes), matrix(2:nodes, 2:nodes + 1)
+      integer :: i, j, m
+
+      call branch_law(mesh, branch, alpha, gamma)
+      m = size(state)/2
+      shift(1) = sum(state(:m))
+      force(1) = alpha(1)*shift(1) + gamma(1)
+      do i = 2, nodes
+         free(i) = sum(step%carry_re(:, i)*state(:m) - step%carry_im(:, i)*state(m + 1:)) - step%taken(i, 1)*force(1)
+         matrix(i, nodes + 1) = alpha(i)*free(i) + gamma(i)
+         do j = 2, nodes
+            matrix(i, j) = alpha(i)*step%taken(i, j)
+         end do
+         matrix(i, i) = matrix(i, i) + 1.0_wp
+      end do
+      call eliminate(matrix)
+      force(2:) = matrix(:, nodes + 1)
+      do i = 2, nodes
+         shift(i) = free(i) - sum(step%taken(i, 2:)*force(2:))
+      end do
+   end subroutine solve_step
+
+   !> Gaussian elimination of a system whose matrix is near to one; right sides in the columns behind it.
+   pure subroutine eliminate(matrix)
+      !> Matrix and right sides before, solutions in place of the right sides after.
+      real(wp), intent(inout), contiguous :: matrix(:, :)
+
+      real(wp) :: factor
+      integer :: i, k, n
+
+      n = size(matrix, 1)
+      do k = 1, n
+         matrix(k, k + 1:) = matrix(k, k + 1:)/matrix(k, k)
+         do i = 1, n
+            if (i == k) cycle
+            factor = matrix(i, k)
+            matrix(i, k + 1:) = matrix(i, k + 1:) - factor*matrix(k, k + 1:)
+         end do
+      end do
+   end subroutine eliminate
+
+   !> Carry a state to one point of the step.
+   pure subroutine carry_state(step, force, i, state)
+      !> Coefficients.
+      type(step_coefficients), intent(in) :: step
+      !> N at each point.
+      real(wp), intent(in) :: force(nodes)
+      !> The point.
+      integer, intent(in) :: i
+      !> State at the start before, at the point after.
+      real(wp), intent(inout), contiguous :: state(:)
+
+      real(wp) :: re, im
+      integer :: k, m
+
+      m = size(state)/2
+      do k = 1, m
+         re = state(k)
+         im = state(m + k)
+         state(k) = step%carry_re(k, i)*re - step%carry_im(k, i)*im - sum(step%taken_re(k, :, i)*force)
+         state(m + k) = step%carry_re(k, i)*im + step%carry_im(k, i)*re - sum(step%taken_im(k, :, i)*force)
+      end do
+   end subroutine carry_state
+
+   !> Carry tangents over a step: the same linear maps, without what does not depend on the state.
+   pure subroutine carry_tangents(step, alpha, tangents)
+      !> Coefficients.
+      type(step_coefficients), intent(in) :: step
+      !> Derivative of N by x at each point.
+      real(wp), intent(in) :: alpha(nodes)
+      !> Tangents, one in a row, shape (tangents, size).
+      real(wp), intent(inout), contiguous :: tangents(:, :)
+
+      real(wp) :: matrix(2:nodes, 2:2*nodes), force(size(tangents, 1), nodes), free(size(tangents, 1), 2:nodes)
+      real(wp), dimension(size(tangents, 1)) :: re, im
+      integer :: i, j, k, m
+
+      m = size(tangents, 2)/2
+      matrix = 0.0_wp
+      do i = 2, nodes
+         do j = 2, nodes
+            matrix(i, j) = alpha(i)*step%taken(i, j)
+         end do
+         matrix(i, i) = matrix(i, i) + 1.0_wp
+         matrix(i, nodes + i - 1) = alpha(i)
+      end do
+      call eliminate(matrix(:, :2*nodes - 1))
+      force = 0.0_wp
+      do k = 1, m
+         force(:, 1) = force(:, 1) + alpha(1)*tangents(:, k)
+      end do
+      do i = 2, nodes
+         free(:, i) = -step%taken(i, 1)*force(:, 1)
+         do k = 1, m
+            free(:, i) = free(:, i) + step%carry_re(k, i)*tangents(:, k) - step%carry_im(k, i)*tangents(:, m + k)
+         end do
+      end do
+      do i = 2, nodes
+         do j = 2, nodes
+            force(:, i) = force(:, i) + matrix(i, nodes + j - 1)*free(:, j)
+         end do
+      end do
+      do k = 1, m
+         re = tangents(:, k)
+         im = tangents(:, m + k)
+         tangents(:, k) = step%carry_re(k, nodes)*re - step%carry_im(k, nodes)*im
+         tangents(:, m + k) = step%carry_re(k, nodes)*im + step%carry_im(k, nodes)*re
+         do j = 1, nodes
+            tangents(:, k) = tangents(:, k) - step%taken_re(k, j, nodes)*force(:, j)
+            tangents(:, m + k) = tangents(:, m + k) - step%taken_im(k, j, nodes)*force(:, j)
+         end do
+      end do
+   end subroutine carry_tangents
+
+   !> Record the points of a step; the first one of the period too.
+   pure subroutine record(modal, step, time, period, state, force, orbit)
+      !> The modes.
+      type(modal_system), intent(in) :: modal
+      !> Coefficients.
+      type(step_coefficients), intent(in) :: step
+      !> Time of each point since the section [s].
+      real(wp), intent(in) :: time(nodes)
+      !> Mesh period [s].
+      real(wp), intent(in) :: period
+      !> State at the start of the step.
+      real(wp), intent(in), contiguous :: state(:)
+      !> N at each point.
+      real(wp), intent(in) :: force(nodes)
+      !> Where to.
+      type(orbit_type), intent(inout) :: orbit
+
+      real(wp) :: at_point(size(state))
+      complex(wp) :: z(modal%modes), dz(modal%modes)
+      integer :: i, last, m
+
+      m = modal%modes
+      do i = merge(1, 2, orbit%samples == 0), nodes
+         at_point = state
+         if (i > 1) then
+            call carry_state(step, force, i, at_point)
+            orbit%samples = orbit%samples + 1
+         end if
+         last = orbit%samples
+         z = cmplx(at_point(:m), at_point(m + 1:), wp)
+         dz = modal%rate*z - modal%influence*force(i)
+         orbit%time(last) = time(i)
+         orbit%value(:, last) = real(matmul(modal%observation, z), wp)
+         orbit%rate(:, last) = real(matmul(modal%observation, dz), wp)
+         ! The rate of N does not reach the acceleration of a position.
+         orbit%acceleration(:, last) = real(matmul(modal%observation, modal%rate*dz), wp)
+      end do
+      last = orbit%samples
+      orbit%weight(last - nodes + 1:last) = orbit%weight(last - nodes + 1:last) + quadrature*step%length/period
+   end subroutine record
+
+   !> The modes from the coordinates of the equations of motion.
+   pure function modes_from_coordinates(self, position, velocity) result(state)
+      !> Map.
+      class(collocation_map), intent(in) :: self
+      !> Deviation from the static equilibrium, shape (n).
+      real(wp), intent(in) :: position(:)
+      !> Its rate, shape (n).
+      real(wp), intent(in) :: velocity(:)
+      !> State, shape (size).
+      real(wp), allocatable :: state(:)
+
+      complex(wp) :: z(self%modal%modes)
+
+      z = matmul(self%modal%to_modes, cmplx([position, velocity], 0.0_wp, wp))
+      allocate (state(self%size))
+      state(:self%modal%modes) = real(z, wp)
+      state(self%modal%modes + 1:) = merge(0.0_wp, aimag(z), self%modal%is_real)
+   end function modes_from_coordinates
+
+   !> The coordinates of the equations of motion from the modes.
+   pure subroutine coordinates_from_modes(self, state, position, velocity)
+      !> Map.
+      class(collocation_map), intent(in) :: self
+      !> State, shape (size).
+      real(wp), intent(in) :: state(:)
+      !> Deviation from the static equilibrium, shape (n).
+      real(wp), allocatable, intent(out) :: position(:)
+      !> Its rate, shape (n).
+      real(wp), allocatable, intent(out) :: velocity(:)
+
+      real(wp) :: w(2*self%equations%n)
+      integer :: m
+
+      m = self%modal%modes
+      w = real(matmul(self%modal%from_modes, cmplx(state(:m), state(m + 1:), wp)), wp)
+      position = w(:self%equations%n)
+      velocity = w(self%equations%n + 1:)
+   end subroutine coordinates_from_modes
+
+end module spurflex_integrate_collocation

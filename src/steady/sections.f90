@@ -1,0 +1,116 @@
+!> The latest sections of a motion at the mesh period, and after how many periods they repeat.
+module spurflex_steady_sections
+   use spurflex_base_kinds, only: wp
+   implicit none
+   private
+
+   public :: section_ring, longest_period, weighted_norm
+
+   !> Longest motion looked for, in mesh periods.
+   integer, parameter :: longest_period = 16
+
+   !> How much nearer a longer period must come than a shorter one to be preferred.
+   real(wp), parameter :: clearly_nearer = 0.1_wp
+
+   !> The latest sections.
+   type :: section_ring
+      private
+      !> Weight of each component, shape (size).
+      real(wp), allocatable :: weight(:)
+      !> Sections, latest in column 0, shape (size, 0:longest_period).
+      real(wp), allocatable :: sections(:, :)
+      !> Sections seen.
+      integer :: seen = 0
+   contains
+      !> Begin with a motion.
+      procedure :: reset
+      !> Take a section.
+      procedure :: add
+      !> The period with which the motion seems to repeat, and how nearly.
+      procedure :: nearest
+      !> How large the motion is.
+      procedure :: scale => largest_norm
+   end type section_ring
+
+contains
+
+   !> Begin with a motion.
+   pure subroutine reset(self, weight)
+      !> Ring.
+      class(section_ring), intent(inout) :: self
+      !> Weight of each component of the state, shape (size).
+      real(wp), intent(in) :: weight(:)
+
+      self%weight = weight
+      if (allocated(self%sections)) deallocate (self%sections)
+      allocate (self%sections(size(weight), 0:longest_period), source=0.0_wp)
+      self%seen = 0
+   end subroutine reset
+
+   !> Take a section.
+   pure subroutine add(self, state)
+      !> Ring.
+      class(section_ring), intent(inout) :: self
+      !> State at the section, shape (size).
+      real(wp), intent(in) :: state(:)
+
+      integer :: k
+
+      do k = longest_period, 1, -1
+         self%sections(:, k) = self%sections(:, k - 1)
+      end do
+      self%sections(:, 0) = state
+      self%seen = self%seen + 1
+   end subroutine add
+
+   !> The period with which the motion comes nearest to repeating; a longer one only where it is clearly nearer.
+   pure subroutine nearest(self, period, distance)
+      !> Ring.
+      class(section_ring), intent(in) :: self
+      !> Period in mesh periods.
+      integer, intent(out) :: period
+      !> Weighted distance of the sections that far apart [m].
+      real(wp), intent(out) :: distance
+
+      real(wp) :: d
+      integer :: k
+
+      period = 1
+      distance = huge(1.0_wp)
+      do k = 1, min(longest_period, self%seen - 1)
+         d = weighted_norm(self%weight, self%sections(:, 0) - self%sections(:, k))
+         if (d < clearly_nearer*distance) then
+            period = k
+            distance = d
+         end if
+      end do
+   end subroutine nearest
+
+   !> Largest norm among the sections [m].
+   pure function largest_norm(self) result(norm)
+      !> Ring.
+      class(section_ring), intent(in) :: self
+      !> The norm; not a number where a state is not.
+      real(wp) :: norm
+
+      integer :: k
+
+      norm = 0.0_wp
+      do k = 0, min(longest_period, self%seen - 1)
+         norm = max(norm, weighted_norm(self%weight, self%sections(:, k)))
+      end do
+   end function largest_norm
+
+   !> Norm of a state: a bound of what it does to y1, to a bearing deformation or to the mesh deflection [m].
+   pure function weighted_norm(weight, state) result(norm)
+      !> Weight of each component, shape (size).
+      real(wp), intent(in) :: weight(:)
+      !> State, shape (size).
+      real(wp), intent(in) :: state(:)
+      !> Largest weighted component.
+      real(wp) :: norm
+
+      norm = norm2(weight*state)
+   end function weighted_norm
+
+end module spurflex_steady_sections

@@ -1,0 +1,60 @@
+!> What a rank does now and then during long work: answer other ranks and say how far the sweep is.
+module spurflex_sweep_attendance
+   use mpi_f08, only: mpi_wtime
+   use spurflex_base_attendant, only: attendant
+   use spurflex_base_kinds, only: wp, i8
+   use spurflex_base_text, only: to_text
+   use spurflex_io_log, only: logger
+   use spurflex_measure_response, only: status_settled, status_not_settled, status_diverged, status_inaccurate
+   use spurflex_sweep_schedule, only: scheduler
+   implicit none
+   private
+
+   public :: sweep_attendant, outcome_text
+
+   !> Seconds between two looks at the messages.
+   real(wp), parameter :: interval = 0.5e-3_wp
+
+   !> The scheduler and the logger of a rank.
+   type, extends(attendant) :: sweep_attendant
+      !> Hands out chunks.
+      type(scheduler) :: schedule
+      !> Hears of the progress.
+      type(logger), pointer :: log => null()
+      !> Points in all.
+      integer(i8) :: points = 0_i8
+      !> Time of the last look [s].
+      real(wp), private :: last = 0.0_wp
+   contains
+      !> Answer and report, if the last time is long enough ago.
+      procedure :: attend => attend_to_ranks
+   end type sweep_attendant
+
+contains
+
+   !> Answer and report, if the last time is long enough ago.
+   subroutine attend_to_ranks(self)
+      !> Attendant.
+      class(sweep_attendant), intent(inout) :: self
+
+      real(wp) :: now
+
+      now = mpi_wtime()
+      if (now - self%last < interval) return
+      self%last = now
+      call self%schedule%serve()
+      call self%log%progress(sum(int(self%schedule%total, i8)), self%points, outcome_text(self%schedule%total))
+   end subroutine attend_to_ranks
+
+   !> How many points ended how.
+   pure function outcome_text(total) result(text)
+      !> Points by status, shape (outcomes).
+      integer, intent(in) :: total(:)
+      !> Text such as `120 settled, 3 not settled`.
+      character(len=:), allocatable :: text
+
+      text = to_text(total(status_settled))//' settled, '//to_text(total(status_not_settled))//' not settled, ' &
+             //to_text(total(status_diverged))//' diverged, '//to_text(total(status_inaccurate))//' inaccurate'
+   end function outcome_text
+
+end module spurflex_sweep_attendance

@@ -1,0 +1,158 @@
+!> One rank's work: take a chunk, solve its points one after the other, write it, take the next.
+module spurflex_sweep_worker
+   use mpi_f08, only: MPI_Comm
+   use spurflex_base_error, only: error_type
+   use spurflex_base_kinds, only: wp, i8
+   use spurflex_integrate_options, only: start_rest, start_down
+   use spurflex_io_axes, only: speeds, stiffnesses
+   use spurflex_io_case, only: case_type
+   use spurflex_io_log, only: logger
+   use spurflex_io_results, only: results_file, write_rigid, write_flexible
+   use spurflex_measure_point, only: point_solver, new_point_solver, respond
+   use spurflex_measure_response, only: response, nan, status_diverged
+   use spurflex_model_equations, only: equations_type, new_equations, rest_deviation
+   use spurflex_model_parameters, only: operating_point, support_rigid, support_flexible
+   use spurflex_sweep_attendance, only: sweep_attendant
+   use spurflex_sweep_plan, only: chunk_type, is_chained
+   use spurflex_sweep_schedule, only: new_scheduler
+   implicit none
+   private
+
+   public :: work_on_chunks, no_twin
+
+   !> Larger than every deformation: a rigid twin that is not known, or not on this rank.
+   real(wp), parameter :: no_twin = huge(1.0_wp)
+
+contains
+
+   !> Solve the points of chunks as long as there are any. All ranks call this together.
+   subroutine work_on_chunks(case, chunks, comm, results, log, rigid_deformation, total, error)
+      !> Case.
+      type(case_type), intent(in) :: case
+      !> Chunks, the same on every rank.
+      type(chunk_type), intent(in) :: chunks(:)
+      !> The ranks.
+      type(MPI_Comm), intent(in) :: comm
+      !> Open result file.
+      type(results_file), intent(in) :: results
+      !> Logger.
+      type(logger), intent(in), target :: log
+      !> Largest bearing deformations of the rigid twins, shape (2, speed): filled in where this rank solves rigid points;
+      !> unallocated if they are not asked for.
+      real(wp), allocatable, intent(inout) :: rigid_deformation(:, :)
+      !> On rank 0: points by status on all ranks, shape (outcomes).
+      integer, intent(out) :: total(:)
+      !> Set where a chunk cannot be written.
+      type(error_type), allocatable, intent(out) :: error
+
+      type(sweep_attendant) :: visitor
+      type(point_solver) :: solver
+      type(response), allocatable :: responses(:)
+      integer :: number, i
+      logical :: available
+
+      visitor%log => log
+      visitor%points = sum(int(chunks%count, i8))
+      call new_scheduler(visitor%schedule, comm, size(chunks))
+      call new_point_solver(case%solver, solver)
+      do
+         call visitor%schedule%take(number, available)
+         if (.not. available) exit
+         allocate (responses(chunks(number)%count))
+         call solve_chunk(case, chunks(number), solver, visitor, responses)
+         call write_chunk(chunks(number), responses, results, rigid_deformation, error)
+         if (allocated(error)) return
+         do i = 1, size(responses)
+            call visitor%schedule%count_point(responses(i)%status)
+         end do
+         deallocate (responses)
+      end do
+      call visitor%schedule%finish()
+      total = visitor%schedule%total
+   end subroutine work_on_chunks
+
+   !> Solve the points of a chunk.
+   subroutine solve_chunk(case, chunk, solver, visitor, responses)
+      !> Case.
+      type(case_type), intent(in) :: case
+      !> The chunk.
+      type(chunk_type), intent(in) :: chunk
+      !> Solver.
+      type(point_solver), intent(inout) :: solver
+      !> Let in now and then.
+      type(sweep_attendant), intent(inout) :: visitor
+      !> Responses in the order of the speeds, shape (count).
+      type(response), intent(out) :: responses(:)
+
+      type(equations_type) :: equations
+      type(operating_point) :: point
+      real(wp), allocatable :: position(:), velocity(:), speed(:), stiffness(:)
+      integer :: i, k
+      logical :: continues
+
+      speed = speeds(case%sweep)
+      stiffness = stiffnesses(case%sweep)
+      continues = .false.
+      point%support = merge(support_flexible, support_rigid, chunk%row > 0)
+      if (chunk%row > 0) point%support_stiffness = stiffness(chunk%row)
+      do k = 1, chunk%count
+         i = merge(chunk%count + 1 - k, k, case%solver%start == start_down)
+         point%speed = speed(chunk%first + i - 1)
+         equations = new_equations(case%gears, case%box, case%load, point)
+         if (.not. continues) call set_start(case, equations, position, velocity)
+         call respond(solver, equations, position, velocity, visitor, responses(i))
+         continues = is_chained(case) .and. responses(i)%status /= status_diverged
+      end do
+   end subroutine solve_chunk
+
+   !> Where a point starts that continues no other: at rest, or in static equilibrium.
+   pure subroutine set_start(case, equations, position, velocity)
+      !> Case.
+      type(case_type), intent(in) :: case
+      !> Equations of motion of the point.
+      type(equations_type), intent(in) :: equations
+      !> Deviation from the static equilibrium and its rate, shape (n).
+      real(wp), allocatable, intent(inout) :: position(:), velocity(:)
+
+      if (allocated(position)) deallocate (position)
+      if (allocated(velocity)) deallocate (velocity)
+      allocate (position(equations%n), velocity(equations%n), source=0.0_wp)
+      if (case%solver%start == start_rest) position = rest_deviation(equations)
+   end subroutine set_start
+
+   !> Write a complete chunk; keep rigid twins, compare with them.
+   subroutine write_chunk(chunk, responses, results, rigid_deformation, error)
+      !> The chunk.
+      type(chunk_type), intent(in) :: chunk
+      !> Its responses, shape (count).
+      type(response), intent(in) :: responses(:)
+      !> Open result file.
+      type(results_file), intent(in) :: results
+      !> Rigid twins, shape (2, speed); unallocated if they are not asked for.
+      real(wp), allocatable, intent(inout) :: rigid_deformation(:, :)
+      !> Set where the chunk cannot be written.
+      type(error_type), allocatable, intent(out) :: error
+
+      real(wp) :: eta(2, size(responses)), rigid(2)
+      integer :: i
+
+      eta = nan()
+      if (chunk%row == 0) then
+         do i = 1, size(responses)
+            if (responses(i)%status == status_diverged) cycle
+            rigid_deformation(:, chunk%first + i - 1) = responses(i)%bearing_deformation_max
+         end do
+         call write_rigid(results, chunk%first, responses, error)
+         return
+      end if
+      if (allocated(rigid_deformation)) then
+         do i = 1, size(responses)
+            rigid = rigid_deformation(:, chunk%first + i - 1)
+            if (any(rigid >= no_twin) .or. any(rigid <= 0.0_wp) .or. responses(i)%status == status_diverged) cycle
+            eta(:, i) = 100.0_wp*(responses(i)%bearing_deformation_max - rigid)/rigid
+         end do
+      end if
+      call write_flexible(results, chunk%row, chunk%first, responses, eta, error)
+   end subroutine write_chunk
+
+end module spurflex_sweep_worker
