@@ -10,6 +10,7 @@ module spurflex_io_results_layout
    use spurflex_measure_response, only: contact_both_flanks, contact_kept, contact_lost, motion_chaotic, &
       motion_quasi_periodic, motion_unresolved, response, status_diverged, status_inaccurate, status_missing, &
       status_not_settled, status_settled
+   use spurflex_steady_outcome, only: motion_of_periods
    use spurflex_steady_sections, only: longest_period
    implicit none
    private
@@ -217,7 +218,7 @@ contains
 
       select case (kind)
       case (motion_flag)
-         values = [motion_unresolved, (i, i=1, longest_period), motion_quasi_periodic, motion_chaotic]
+         values = [motion_unresolved, motion_of_periods([(i, i=1, longest_period)]), motion_quasi_periodic, motion_chaotic]
          meanings = 'unresolved'
          do i = 1, longest_period
             meanings = meanings//' period_'//to_text(i)

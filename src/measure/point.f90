@@ -14,7 +14,7 @@ module spurflex_measure_point
    use spurflex_integrate_steps, only: first_steps, better_steps, most_steps
    use spurflex_measure_motion, only: motion_measure
    use spurflex_measure_response, only: response, empty_response, status_settled, status_inaccurate, status_diverged, &
-      contact_kept, contact_lost, contact_both_flanks, motion_quasi_periodic
+      contact_kept, contact_lost, contact_both_flanks
    use spurflex_model_equations, only: equations_type
    use spurflex_steady_outcome, only: steady_motion
    use spurflex_steady_search, only: find_steady_motion
@@ -81,7 +81,7 @@ contains
       answer%floquet_magnitude = motion%floquet_magnitude
       answer%lyapunov_exponent = motion%lyapunov_exponent
       answer%lyapunov_error = motion%lyapunov_error
-      if (motion%motion >= 1 .and. motion%motion < motion_quasi_periodic) then
+      if (motion%periods > 0) then
          call measure_periodic(solver, equations, visitor, motion, answer)
       else
          call measure_window(solver, equations, visitor, motion, answer)
@@ -108,9 +108,9 @@ contains
       logical :: found
 
       do
-         call measure_periods(solver%map, motion%motion, motion%state, equations, solver%orbit, answer)
+         call measure_periods(solver%map, motion%periods, motion%state, equations, solver%orbit, answer)
          call solver%map%from_state(motion%state, position, velocity)
-         call judge_motion(solver, equations, position, velocity, motion%motion, visitor, judged, found)
+         call judge_motion(solver, equations, position, velocity, motion%periods, visitor, judged, found)
          if (found) then
             answer%error_estimate = relative_difference(answer, judged)
             if (answer%error_estimate <= solver%options%tolerance) exit
@@ -147,7 +147,7 @@ contains
       call map%load(equations, steps, error)
       if (allocated(error)) return
       motion%state = map%to_state(position, velocity)
-      call find_orbit(map, motion%state, motion%motion, size_of(map, motion%state), visitor, orbit, found)
+      call find_orbit(map, motion%state, motion%periods, size_of(map, motion%state), visitor, orbit, found)
       if (found) motion%state = orbit%state
    end subroutine refine
 

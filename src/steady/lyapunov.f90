@@ -22,6 +22,8 @@ module spurflex_steady_lyapunov
       integer :: blocks = 0
       real(wp) :: total = 0.0_wp, total_square = 0.0_wp
    contains
+      !> Begin anew.
+      procedure :: reset
       !> Take the tangent after a period and make it a unit again.
       procedure :: add
       !> Exponent and its standard error.
@@ -29,6 +31,18 @@ module spurflex_steady_lyapunov
    end type lyapunov_sum
 
 contains
+
+   !> Begin anew.
+   pure subroutine reset(self)
+      !> Sum.
+      class(lyapunov_sum), intent(inout) :: self
+
+      self%periods = 0
+      self%growth = 0.0_wp
+      self%blocks = 0
+      self%total = 0.0_wp
+      self%total_square = 0.0_wp
+   end subroutine reset
 
    !> Take the tangent after a period and make it a unit again.
    pure subroutine add(self, weight, tangent)
@@ -55,18 +69,21 @@ contains
    end subroutine add
 
    !> Exponent and its standard error; the error is infinite before there are two blocks.
-   pure subroutine mean_growth(self, exponent, error)
+   pure subroutine mean_growth(self, exponent, error, periods)
       !> Sum.
       class(lyapunov_sum), intent(in) :: self
       !> Largest Lyapunov exponent [1/mesh period].
       real(wp), intent(out) :: exponent
       !> Its standard error [1/mesh period].
       real(wp), intent(out) :: error
+      !> Mesh periods summed over.
+      integer, intent(out) :: periods
 
       real(wp) :: variance
 
       exponent = 0.0_wp
       error = huge(1.0_wp)
+      periods = self%blocks*block
       if (self%blocks < 1) return
       exponent = self%total/real(self%blocks, wp)
       if (self%blocks < 2) return

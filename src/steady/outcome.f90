@@ -7,7 +7,7 @@ module spurflex_steady_outcome
    public :: steady_motion
    public :: status_missing, status_settled, status_not_settled, status_diverged, status_inaccurate
    public :: contact_kept, contact_lost, contact_both_flanks
-   public :: motion_unresolved, motion_quasi_periodic, motion_chaotic
+   public :: motion_unresolved, motion_quasi_periodic, motion_chaotic, motion_of_periods, longest_named
 
    !> The point has not been computed yet.
    integer, parameter :: status_missing = 0
@@ -34,10 +34,16 @@ module spurflex_steady_outcome
    !> Sensitive dependence on the state: the largest Lyapunov exponent is positive.
    integer, parameter :: motion_chaotic = 30
 
+   !> Longest motion whose class is its number of mesh periods; longer ones have `long_period` added to it.
+   integer, parameter :: longest_named = 8
+   integer, parameter :: long_period = 100
+
    !> The steady motion of one point.
    type :: steady_motion
-      !> Mesh periods after which the motion repeats, or `motion_...`.
+      !> Class: mesh periods after which the motion repeats (`motion_of_periods`), or `motion_...`.
       integer :: motion = motion_unresolved
+      !> Mesh periods after which the motion repeats, 0 if it does not.
+      integer :: periods = 0
       !> `status_...`.
       integer :: status = status_missing
       !> Mesh periods integrated to find it.
@@ -49,5 +55,18 @@ module spurflex_steady_outcome
       !> State of the period map at a section of the motion, shape (size).
       real(wp), allocatable :: state(:)
    end type steady_motion
+
+contains
+
+   !> Class of a periodic motion: n up to eight mesh periods, 100 + n for longer ones.
+   elemental function motion_of_periods(periods) result(motion)
+      !> Mesh periods after which it repeats.
+      integer, intent(in) :: periods
+      !> The class.
+      integer :: motion
+
+      motion = periods
+      if (periods > longest_named) motion = long_period + periods
+   end function motion_of_periods
 
 end module spurflex_steady_outcome

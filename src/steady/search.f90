@@ -12,7 +12,7 @@ module spurflex_steady_search
    use spurflex_integrate_period_map, only: period_map
    use spurflex_steady_lyapunov, only: lyapunov_sum
    use spurflex_steady_outcome, only: steady_motion, status_settled, status_not_settled, status_diverged, &
-      motion_unresolved, motion_quasi_periodic, motion_chaotic
+      motion_unresolved, motion_quasi_periodic, motion_chaotic, motion_of_periods
    use spurflex_steady_sections, only: section_ring, weighted_norm, longest_period
    use spurflex_steady_shooting, only: periodic_orbit, find_orbit, floquet_multipliers, contact_is_kept
    implicit none
@@ -41,8 +41,12 @@ module spurflex_steady_search
    !> Standard errors by which an exponent must differ from zero.
    real(wp), parameter :: significance = 4.0_wp
 
-   !> Exponent that is zero for a motion that is quasi-periodic [1/mesh period].
-   real(wp), parameter :: neutral_exponent = 2.0e-3_wp
+   !> Growth of a tangent that says nothing, however long it is summed: on a torus it grows in proportion to time and
+   !> wanders by a few units of its logarithm.
+   real(wp), parameter :: neutral_growth = 10.0_wp
+
+   !> Distance of the sections of a motion, beside its size, that is none.
+   real(wp), parameter :: same_section = 1.0e-6_wp
 
    !> A state of this norm has left every physical range; far below overflow [m].
    real(wp), parameter :: diverged_norm = 1.0e100_wp
@@ -90,6 +94,8 @@ contains
       do
          call look_for_orbit(map, transient, options, visitor, spent, motion, found)
          if (found .or. .not. transient%sound .or. transient%periods >= options%max_periods) exit
+         ! The exponent is that of the latest half: what came before was still on its way.
+         call transient%growth%reset()
          call advance_transient(map, transient, min(next_look, options%max_periods), visitor)
          if (.not. transient%sound) exit
          next_look = 2*next_look
@@ -158,6 +164,7 @@ contains
       call find_orbit(map, transient%state, n, max(transient%ring%scale(), abs(map%half_backlash)), visitor, orbit, found)
       spent = spent + orbit%integrated
       if (.not. found) return
+      call reduce_period(map, visitor, spent, orbit)
       call floquet_multipliers(orbit%monodromy, multipliers, error)
       found = .not. allocated(error)
       if (.not. found) return
@@ -166,12 +173,43 @@ contains
       call approaches(map, orbit, transient, options, visitor, found)
       if (.not. found) return
       motion%status = status_settled
-      motion%motion = n
+      motion%periods = orbit%periods
+      motion%motion = motion_of_periods(orbit%periods)
       motion%floquet_magnitude = maxval(abs(multipliers))
-      motion%lyapunov_exponent = log(max(motion%floquet_magnitude, tiny(1.0_wp)))/real(n, wp)
+      motion%lyapunov_exponent = log(max(motion%floquet_magnitude, tiny(1.0_wp)))/real(orbit%periods, wp)
       motion%lyapunov_error = 0.0_wp
       motion%state = orbit%state
    end subroutine look_for_orbit
+
+   !> Take the shortest period of a motion that was found with a multiple of it.
+   subroutine reduce_period(map, visitor, spent, orbit)
+      !> Period map at an operating point.
+      class(period_map), intent(inout) :: map
+      !> Let in between the periods.
+      class(attendant), intent(inout) :: visitor
+      !> Mesh periods spent on Newton's method, counted up.
+      integer, intent(inout) :: spent
+      !> The motion.
+      type(periodic_orbit), intent(inout) :: orbit
+
+      type(periodic_orbit) :: shorter
+      real(wp) :: moving(size(orbit%state)), scale
+      integer :: k
+      logical :: found
+
+      moving = orbit%state
+      scale = max(weighted_norm(map%weight, orbit%state), map%half_backlash)
+      do k = 1, orbit%periods/2
+         call map%advance(moving)
+         spent = spent + 1
+         if (mod(orbit%periods, k) /= 0) cycle
+         if (weighted_norm(map%weight, moving - orbit%state) > same_section*scale) cycle
+         call find_orbit(map, orbit%state, k, scale, visitor, shorter, found)
+         spent = spent + shorter%integrated
+         if (found) orbit = shorter
+         if (found) return
+      end do
+   end subroutine reduce_period
 
    !> The transient is on its way to a stable motion.
    subroutine approaches(map, orbit, transient, options, visitor, it_does)
@@ -225,12 +263,15 @@ contains
       !> The motion.
       type(steady_motion), intent(inout) :: motion
 
-      call transient%growth%exponent(motion%lyapunov_exponent, motion%lyapunov_error)
+      real(wp) :: neutral
+      integer :: periods
+
+      call transient%growth%exponent(motion%lyapunov_exponent, motion%lyapunov_error, periods)
+      neutral = neutral_growth/real(max(periods, 1), wp)
       motion%status = status_settled
-      if (motion%lyapunov_exponent > significance*motion%lyapunov_error) then
+      if (motion%lyapunov_exponent > neutral + significance*motion%lyapunov_error) then
          motion%motion = motion_chaotic
-      else if (abs(motion%lyapunov_exponent) < neutral_exponent &
-               .and. significance*motion%lyapunov_error < neutral_exponent) then
+      else if (abs(motion%lyapunov_exponent) < neutral .and. significance*motion%lyapunov_error < neutral) then
          motion%motion = motion_quasi_periodic
       else
          motion%motion = motion_unresolved

@@ -7,7 +7,7 @@ module spurflex_steady_sections
    public :: section_ring, longest_period, weighted_norm
 
    !> Longest motion looked for, in mesh periods.
-   integer, parameter :: longest_period = 16
+   integer, parameter :: longest_period = 64
 
    !> How much nearer a longer period must come than a shorter one to be preferred.
    real(wp), parameter :: clearly_nearer = 0.1_wp
@@ -17,7 +17,7 @@ module spurflex_steady_sections
       private
       !> Weight of each component, shape (size).
       real(wp), allocatable :: weight(:)
-      !> Sections, latest in column 0, shape (size, 0:longest_period).
+      !> Sections, the one after k periods in column mod(k, longest_period + 1), shape (size, 0:longest_period).
       real(wp), allocatable :: sections(:, :)
       !> Sections seen.
       integer :: seen = 0
@@ -54,12 +54,7 @@ contains
       !> State at the section, shape (size).
       real(wp), intent(in) :: state(:)
 
-      integer :: k
-
-      do k = longest_period, 1, -1
-         self%sections(:, k) = self%sections(:, k - 1)
-      end do
-      self%sections(:, 0) = state
+      self%sections(:, mod(self%seen, longest_period + 1)) = state
       self%seen = self%seen + 1
    end subroutine add
 
@@ -78,7 +73,7 @@ contains
       period = 1
       distance = huge(1.0_wp)
       do k = 1, min(longest_period, self%seen - 1)
-         d = weighted_norm(self%weight, self%sections(:, 0) - self%sections(:, k))
+         d = weighted_norm(self%weight, self%sections(:, column(self, 0)) - self%sections(:, column(self, k)))
          if (d < clearly_nearer*distance) then
             period = k
             distance = d
@@ -100,6 +95,18 @@ contains
          norm = max(norm, weighted_norm(self%weight, self%sections(:, k)))
       end do
    end function largest_norm
+
+   !> Column of the section some periods ago.
+   pure function column(self, ago) result(place)
+      !> Ring.
+      class(section_ring), intent(in) :: self
+      !> Mesh periods ago, less than the sections seen.
+      integer, intent(in) :: ago
+      !> The column.
+      integer :: place
+
+      place = mod(self%seen - 1 - ago, longest_period + 1)
+   end function column
 
    !> Norm of a state: a bound of what it does to y1, to a bearing deformation or to the mesh deflection [m].
    pure function weighted_norm(weight, state) result(norm)
