@@ -36,6 +36,31 @@ def flexible_amplitude(speed: Reals, stiffness: Reals) -> Reals:
     return np.asarray(1e-6 * (smooth + upper))
 
 
+def veering_crests(stiffness: Reals) -> tuple[Reals, Reals]:
+    """Three crests that veer instead of crossing: the support's meets two of the gear pair.
+
+    Returns:
+        Speeds [rev/min] and amplitudes [m] of the crests, shape (m, 3). With a soft support
+        they lie near 0, 1290 and 1900, with a stiff one near 1180, 1730 and infinity.
+    """
+    first, second = 1180.0**2, 1730.0**2
+    couple = np.sqrt([first * (1290.0**2 - first), second * (1900.0**2 - second)])
+    matrix = np.zeros((len(stiffness), 3, 3))
+    matrix[:, 0, 0] = 470.0**2 * stiffness / 2.5e8 + couple[0] ** 2 / first
+    matrix[:, 0, 0] += couple[1] ** 2 / second
+    matrix[:, 0, 1:] = matrix[:, 1:, 0] = couple
+    matrix[:, 1, 1], matrix[:, 2, 2] = first, second
+    squares, shapes = np.linalg.eigh(matrix)
+    return np.sqrt(squares), 1e-6 * (1.5 + 16 * (1 - shapes[:, 0, :] ** 2))
+
+
+def veering_amplitude(speed: Reals, stiffness: Reals) -> Reals:
+    """A map with the crests of `veering_crests`; shape (m, n) [m]."""
+    centres, heights = veering_crests(stiffness)
+    curves = [crest(speed, centres[:, [at]], 35, heights[:, [at]]) for at in range(3)]
+    return np.asarray(5e-7 + np.sum(curves, axis=0))
+
+
 def write_result(
     path: Path,
     speed: Reals,

@@ -69,6 +69,17 @@ def test_irregular_band_is_ignored_inside_but_its_border_is_judged() -> None:
     assert [(jump.speed, jump.kind) for jump in found.jumps] == [(4645.0, "edge"), (4995.0, "edge")]
 
 
+def test_jump_at_a_band_is_where_its_level_is_reached() -> None:
+    band = (SPEED >= 4870) & (SPEED <= 4950)
+    amplitude = np.where(band, 9.0, 4.0 - (SPEED - 4800) / 400)
+    ends = np.isin(SPEED, (4870, 4950))
+    amplitude[ends] = 4.0 - (SPEED[ends] - 4800) / 400
+    found = find_branches(SPEED, amplitude, ~band)
+    assert found.bands == [(4870.0, 4950.0)]
+    assert [(jump.first, jump.last) for jump in found.jumps] == [(4870, 4880), (4940, 4950)]
+    assert [jump.after > jump.before for jump in found.jumps] == [True, False]
+
+
 def test_missing_points_are_no_jump() -> None:
     amplitude = rigid_amplitude(SPEED)
     amplitude[[50, 51, 88, 200]] = np.nan

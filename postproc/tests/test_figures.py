@@ -1,5 +1,6 @@
 """Figures: what is drawn is what the file holds."""
 
+from io import BytesIO
 from pathlib import Path
 
 import h5py
@@ -11,6 +12,7 @@ from matplotlib.figure import Figure
 
 from spurflex_postproc import ResultError, open_result
 from spurflex_postproc.figures import FIGURES, Options
+from spurflex_postproc.figures.motion_strip import CLASSES, motion_class
 from spurflex_postproc.figures.scale import amplitude_norm, edges
 
 BAND = (4650.0, 4990.0)
@@ -48,11 +50,50 @@ def test_published_marks(curve_file: Path) -> None:
     (drawing,) = FIGURES["2"].draw(open_result(curve_file), Options())
     marks = [
         np.asarray(mark.get_xdata()).tolist()
-        for mark in drawing.figure.axes[1].lines
+        for mark in drawing.figure.axes[2].lines
         if mark.get_gid() == "flexible, published"
     ]
     assert marks == [[480, 1290, 1900], [4670, 4810, 4880, 5310]]
     assert "1290" in drawing.report
+
+
+@pytest.mark.parametrize("mesh_axis", [False, True])
+def test_legend_is_where_no_curve_can_be(curve_file: Path, mesh_axis: bool) -> None:
+    (drawing,) = FIGURES["2"].draw(open_result(curve_file), Options(mesh_axis=mesh_axis))
+    drawing.figure.savefig(BytesIO(), format="png")
+    axes = drawing.figure.axes[0]
+    below = [axes.bbox] + [child.get_tightbbox() for child in axes.child_axes]
+    legend = axes.get_legend().get_window_extent()
+    assert legend.y0 >= max(box.y1 for box in below)
+    assert legend.y1 <= drawing.figure.bbox.y1
+    assert legend.x1 <= drawing.figure.bbox.x1
+
+
+def test_motion_strip_holds_the_classes(curve_file: Path, tmp_path: Path) -> None:
+    path = tmp_path / "classes.h5"
+    path.write_bytes(curve_file.read_bytes())
+    flags = [1, 2, 3, 4, 8, 20, 30, 0]
+    with h5py.File(path, "r+") as file:
+        file["rigid_motion"][:8] = flags
+        file["status"][0, 9] = 3
+    (drawing,) = FIGURES["2"].draw(open_result(path), Options())
+    axes = drawing.figure.axes[1]
+    rows = {item.get_gid(): np.ravel(item.get_array()) for item in axes.collections}
+    names = [name for name, _, _ in CLASSES]
+    assert [names[at] for at in rows["rigid, motion"][:8]] == [
+        *("1T", "2T", "3T", "4T to 8T", "4T to 8T", "quasi-periodic", "chaotic", "unresolved")
+    ]
+    assert names[rows["flexible, motion"][9]] == "no value"
+    assert [text.get_text() for text in axes.get_legend().get_texts()][:-1] == names
+    np.testing.assert_array_equal(motion_class([-7, 9, 99]), names.index("unresolved"))
+    drawing.figure.savefig(BytesIO(), format="png")
+    assert axes.get_legend().get_window_extent().x1 <= axes.bbox.x1
+
+
+def test_motion_legend_names_only_what_occurs(curve_file: Path) -> None:
+    (drawing,) = FIGURES["2"].draw(open_result(curve_file), Options())
+    legend = drawing.figure.axes[1].get_legend()
+    assert [text.get_text() for text in legend.get_texts()][:-1] == ["1T", "chaotic"]
 
 
 def test_curve_takes_the_nearest_row(map_file: Path) -> None:

@@ -2,9 +2,16 @@
 
 import numpy as np
 import pytest
-from result_files import crest, flexible_amplitude, rigid_amplitude
+from result_files import (
+    crest,
+    flexible_amplitude,
+    rigid_amplitude,
+    veering_amplitude,
+    veering_crests,
+)
 
 from spurflex_postproc.features import compare, comparison_table, crest_line, find_peaks
+from spurflex_postproc.figures.stiffness_table import map_table
 from spurflex_postproc.published import published_curve, published_map
 
 SPEED = np.arange(300.0, 6001.0, 10.0)
@@ -67,6 +74,37 @@ def test_crest_line_follows_the_square_root_of_the_stiffness() -> None:
     assert heights[-1] < heights[0]
 
 
+@pytest.mark.parametrize("count", [46, 61, 91])
+def test_crest_line_ends_where_it_merges(count: int) -> None:
+    stiffness = np.logspace(3, 12, count)
+    amplitude = veering_amplitude(SPEED, stiffness)
+    regular = np.ones(amplitude.shape, dtype=bool)
+    line = crest_line(stiffness, SPEED, amplitude, regular, start=(2.5e8, 480), highest=3100)
+    known = np.flatnonzero(np.isfinite(line.speed))
+    assert known.size >= 4
+    lowest = veering_crests(stiffness)[0][:, 0]
+    assert line.speed[known] == pytest.approx(lowest[known], rel=0.02)
+    assert 850 < line.speed[known[-1]] < 1120
+    assert stiffness[known[-1]] < 4e9
+    assert np.isnan(line.height[known[-1] + 1 :]).all()
+
+
+@pytest.mark.parametrize("count", [46, 61, 91])
+def test_crests_on_both_sides_of_the_line_are_found(count: int) -> None:
+    stiffness = np.logspace(3, 12, count)
+    amplitude = veering_amplitude(SPEED, stiffness)
+    regular = np.ones(amplitude.shape, dtype=bool)
+    line = crest_line(stiffness, SPEED, amplitude, regular, start=(2.5e8, 480), highest=3100)
+    table = map_table(stiffness, SPEED, amplitude, regular, line, published_map()).splitlines()
+    for name, speeds in (("below", (1290, 1900)), ("above", (1180, 1730))):
+        rows = [row.split() for row in table if row.startswith(f"  crest {name} the line")]
+        assert [float(row[4]) for row in rows] == list(speeds)
+        centres = veering_crests(stiffness[[0, -1]])[0]
+        truth = centres[0, 1:] if name == "below" else centres[1, :2]
+        assert [float(row[5]) for row in rows] == pytest.approx(list(truth), rel=0.015)
+        assert all(abs(float(row[6])) < 4 for row in rows)
+
+
 def test_no_crest_line_in_a_plain() -> None:
     line = crest_line(
         [1e8, 1e9], SPEED, np.ones((2, 571)), np.ones((2, 571)), start=(1e8, 480), highest=3100
@@ -79,6 +117,12 @@ def test_compare_uses_each_feature_once() -> None:
     found = compare([4650, 4730], [4690, 4735, 5400], within=0.03)
     assert found.pairs == [(4650, 4690), (4730, 4735)]
     assert found.others == [5400]
+
+
+def test_compare_reaches_no_farther_than_the_next_published_feature() -> None:
+    found = compare([4650, 4730, 4930], [4865, 4955], within=0.03)
+    assert found.pairs == [(4650, None), (4730, None), (4930, 4955)]
+    assert found.others == [4865]
 
 
 def test_compare_leaves_what_is_far() -> None:

@@ -29,6 +29,9 @@ GREY = "#6E6E6E"
 """What is published, and helping lines."""
 PALE = "#D0D0D0"
 """Points without value."""
+SILVER = "#D8D8D8"
+"""What is usual and should not draw the eye."""
+NAVY = "#003F6B"
 
 RIGID = BLUE
 FLEXIBLE = VERMILION

@@ -205,8 +205,19 @@ def _segments(index: NDArray[np.intp], broken: Flags, band: Flags) -> list[NDArr
 
 
 def _jump(x: Reals, y: Reals, band: Flags, index: NDArray[np.intp], at: int) -> Jump:
-    """Describe the jump at one step."""
+    """Describe the jump at one step; at the border of a band, where its level is reached.
+
+    The outermost points of a band may still lie on the branch beside it.
+    """
     before, after = index[at], index[at + 1]
+    if band[after] and not band[before]:
+        first = index[at + 1 : at + 1 + SHORTEST_BAND]
+        inside = _reached(y[first], y[before])
+        before, after = index[at + inside], index[at + 1 + inside]
+    elif band[before] and not band[after]:
+        last = index[max(at + 1 - SHORTEST_BAND, 0) : at + 1][::-1]
+        inside = _reached(y[last], y[after])
+        before, after = index[at - inside], index[at + 1 - inside]
     return Jump(
         speed=float(x[before] + x[after]) / 2,
         first=float(x[before]),
@@ -215,3 +226,9 @@ def _jump(x: Reals, y: Reals, band: Flags, index: NDArray[np.intp], at: int) -> 
         after=float(y[after]),
         kind="edge" if band[before] or band[after] else "branch",
     )
+
+
+def _reached(y: Reals, outside: float) -> int:
+    """Return the first of the outermost points of a band that lies nearer to its level."""
+    level = float(np.median(y))
+    return int(np.flatnonzero(np.abs(y - level) <= np.abs(y - outside))[0])

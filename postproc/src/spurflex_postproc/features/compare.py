@@ -25,6 +25,8 @@ def compare(
 ) -> Comparison:
     """Pair published with computed features, the closest first, each used once.
 
+    A pair may lie no farther apart than the published feature and the next published one.
+
     Args:
         published: Published speeds [rev/min].
         computed: Computed speeds [rev/min].
@@ -34,13 +36,17 @@ def compare(
         A pair for every published speed, and the computed speeds left over.
     """
     partner: dict[int, int] = {}
+    room = [
+        min((abs(other / here - 1) for j, other in enumerate(published) if j != i), default=within)
+        for i, here in enumerate(published)
+    ]
     distances = sorted(
         (abs(there / here - 1), i, j)
         for i, here in enumerate(published)
         for j, there in enumerate(computed)
     )
     for distance, i, j in distances:
-        if distance <= within and i not in partner and j not in partner.values():
+        if distance <= min(within, room[i]) and i not in partner and j not in partner.values():
             partner[i] = j
     pairs = [
         (here, computed[partner[i]] if i in partner else None) for i, here in enumerate(published)

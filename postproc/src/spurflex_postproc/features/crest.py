@@ -1,4 +1,9 @@
-"""The crest of the soft support in the map over speed and support stiffness."""
+"""The crest of the soft support in the map over speed and support stiffness.
+
+As the support stiffens, the crest rises along a straight line in logarithms until it comes near
+a crest of the gear pair. The two do not cross: the crest that was followed bends and goes on as
+a crest whose speed hardly depends on the stiffness any more. The line ends where it bends.
+"""
 
 from dataclasses import dataclass
 
@@ -20,6 +25,8 @@ LOOSE = 2
 """Rows in a row that may lack the crest before it counts as gone."""
 START_SLOPE = 0.5
 """Power of the stiffness with which the speed grows at first: a mass on a spring."""
+BENT = 0.5
+"""Slope below which the line has merged with another crest, as a fraction of that power."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +35,8 @@ class CrestLine:
 
     Attributes:
         stiffness: Support stiffnesses [N/m], shape (m,).
-        speed: Speed of the crest [rev/min], NaN in rows without it, shape (m,).
+        speed: Speed of the crest [rev/min], shape (m,); NaN in rows without it and where it has
+            merged with another crest.
         height: Amplitude there, in the unit of the map, shape (m,).
     """
 
@@ -88,13 +96,17 @@ def crest_line(
     seed = _nearest(peaks(first), start[1], START_WITHIN)
     if seed is None:
         return line
+    line.speed[first], line.height[first] = seed.speed, seed.height
     for order in (range(first + 1, len(rows)), range(first - 1, -1, -1)):
         known = [(np.log(rows[first]), np.log(seed.speed))]
-        line.speed[first], line.height[first] = seed.speed, seed.height
+        followed = [first]
         lost = 0
         for row in order:
             foretold = float(np.exp(_foretell(known, float(np.log(rows[row])))))
-            found = _nearest(peaks(row), foretold, FOLLOW_WITHIN) if foretold < highest else None
+            crests = peaks(row) if foretold < highest else []
+            found = _nearest(crests, foretold, FOLLOW_WITHIN) or _between(
+                crests, float(np.exp(known[-1][1])), foretold
+            )
             if found is None:
                 lost += 1
                 if lost > LOOSE:
@@ -103,6 +115,9 @@ def crest_line(
             lost = 0
             line.speed[row], line.height[row] = found.speed, found.height
             known.append((np.log(rows[row]), np.log(found.speed)))
+            followed.append(row)
+        merged = followed[_straight(known) :]
+        line.speed[merged], line.height[merged] = np.nan, np.nan
     return line
 
 
@@ -113,6 +128,23 @@ def _foretell(known: list[tuple[float, float]], at: float) -> float:
     x, y = np.transpose(known[-REMEMBER:])
     level = np.polyfit(x - at, y, 1)[1]
     return float(level)
+
+
+def _between(peaks: list[Peak], last: float, foretold: float) -> Peak | None:
+    """Return the peak nearest to the foretold speed that lags behind it: the line may bend."""
+    low, high = min(last, foretold), max(last, foretold)
+    lagging = [peak for peak in peaks if low <= peak.speed <= high]
+    return min(lagging, key=lambda peak: abs(peak.speed - foretold)) if lagging else None
+
+
+def _straight(known: list[tuple[float, float]]) -> int:
+    """Count the crests before the line bends for good: slopes too small twice in a row."""
+    if len(known) < REMEMBER:
+        return len(known)
+    x, y = np.transpose(known)
+    flat = np.gradient(y, x) < BENT * START_SLOPE
+    bends = np.flatnonzero(flat[1:-1] & flat[2:]) + 1
+    return int(bends[0]) if bends.size else len(known)
 
 
 def _nearest(peaks: list[Peak], speed: float, within: float) -> Peak | None:

@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.transforms import offset_copy
 from numpy.typing import NDArray
 
 from spurflex_postproc import style
@@ -27,6 +28,7 @@ from spurflex_postproc.figures.common import (
     nearest_row,
     require_values,
 )
+from spurflex_postproc.figures.motion_strip import draw_motion
 from spurflex_postproc.flags import Motion, Status, is_regular
 from spurflex_postproc.layout import SPEED, STIFFNESS
 from spurflex_postproc.published import PublishedCurve, published_curve
@@ -39,6 +41,9 @@ NEEDS = (
     "rigid_status",
     "rigid_motion",
 )
+
+ABOVE, ABOVE_MESH_AXIS = 2.0, 27.0
+"""Distance of the legend from the curves, without and with a second axis [points]."""
 
 JUMPS_WITHIN = 0.03
 """Largest distance of a computed jump from its published partner, as a fraction."""
@@ -76,7 +81,7 @@ class Curve:
 
 
 def draw(result: xr.Dataset, options: Options) -> list[Drawing]:
-    """Draw both curves in one axes, with the published features in a strip below.
+    """Draw both curves in one axes, with strips of motion classes and of features below.
 
     Args:
         result: A dataset from `open_result` with the variables `NEEDS`.
@@ -99,11 +104,16 @@ def draw(result: xr.Dataset, options: Options) -> list[Drawing]:
             row,
         ),
     ]
-    figure = Figure(figsize=style.size(style.DOUBLE, 92), layout="constrained")
-    axes, strip = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [5, 1]})
+    figure = Figure(figsize=style.size(style.DOUBLE, 108), layout="constrained")
+    axes, classes, strip = figure.subplots(
+        3, 1, sharex=True, gridspec_kw={"height_ratios": [5, 0.4, 1]}
+    )
     for curve in curves:
         _draw_curve(axes, curve)
-    _dress(axes, curves)
+    _dress(figure, axes, curves, above=ABOVE_MESH_AXIS if options.mesh_axis else ABOVE)
+    draw_motion(
+        classes, curves[0].speed, {f"{curve.support}, motion": curve.motion for curve in curves}
+    )
     _draw_strip(strip, curves)
     if options.mesh_axis:
         add_mesh_axis(axes, result)
@@ -171,8 +181,8 @@ def _draw_curve(axes: Axes, curve: Curve) -> None:
         )
 
 
-def _dress(axes: Axes, curves: list[Curve]) -> None:
-    """Add labels, limits and the legend."""
+def _dress(figure: Figure, axes: Axes, curves: list[Curve], *, above: float) -> None:
+    """Add labels, limits and, above the axes where no curve can be, the legend."""
     axes.set_ylabel(AMPLITUDE_LABEL)
     axes.set_xlim(curves[0].speed[0], curves[0].speed[-1])
     axes.set_ylim(bottom=0)
@@ -182,7 +192,14 @@ def _dress(axes: Axes, curves: list[Curve]) -> None:
         if any(np.size(lines[f"{curve.support} {name}"].get_xdata()) for curve in curves):
             label = "quasi-periodic or chaotic" if name == "irregular" else "not settled"
             axes.plot([], [], "o", ms=1.8, mew=0.4, mec=style.GREY, mfc=face, label=label)
-    axes.legend(loc="upper left")
+    axes.legend(
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        bbox_transform=offset_copy(axes.transAxes, figure, y=above, units="points"),
+        ncol=4,
+        borderaxespad=0.2,
+        borderpad=0,
+    )
 
 
 def _draw_strip(strip: Axes, curves: list[Curve]) -> None:
@@ -206,13 +223,20 @@ def _draw_strip(strip: Axes, curves: list[Curve]) -> None:
             strip.plot(peaks, np.full(len(peaks), level), marker="^", ms=3, mew=0, **shared)
             strip.plot(jumps, np.full(len(jumps), level), marker="|", ms=5, mew=0.9, **shared)
     strip.set_yticks(-np.arange(len(names)), names)
-    strip.set_ylim(0.7 - len(names) - 0.4, 0.7)
+    strip.set_ylim(0.3 - len(names), 0.55)
     strip.tick_params(axis="y", length=0)
     strip.spines[["top", "right", "left"]].set_visible(False)
     strip.set_xlabel(SPEED_LABEL)
     strip.plot([], [], "^", ms=3, mew=0, color=style.GREY, label="peak")
     strip.plot([], [], "|", ms=5, mew=0.9, color=style.GREY, label="jump")
-    strip.legend(loc="lower right", bbox_to_anchor=(1.0, 0.9), ncol=2, borderpad=0)
+    strip.legend(
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncol=2,
+        borderaxespad=0.2,
+        borderpad=0,
+        handlelength=1.2,
+    )
 
 
 def _table(curve: Curve) -> str:
@@ -225,4 +249,6 @@ def _table(curve: Curve) -> str:
     )
     table = comparison_table(f"{curve.support} support", [("peak", peaks), ("jump", jumps)])
     bands = ", ".join(f"{first:.0f} to {last:.0f}" for first, last in curve.branches.bands)
-    return table + (f"\n  irregular bands, in which no jumps are sought: {bands}" if bands else "")
+    if bands:
+        table += f"\n  no settled periodic motion (no features sought inside): {bands}"
+    return table

@@ -41,9 +41,11 @@ DOTS = (0.2, 0.45)
 """Smallest and largest dot on a point that did not settle [points]."""
 LIGHT = 0.45
 """Place in the colour map from which dots are black instead of white."""
-MAP = (0.075, 0.2, 0.825, 0.75)
-BAR = (0.915, 0.2, 0.013, 0.75)
-"""Places of the map and of its colour bar: left, bottom, width, height in the figure."""
+MAP = (0.075, 0.155, 0.825, 0.795)
+BAR = (0.915, 0.155, 0.013, 0.795)
+LEGEND = 0.06
+"""Places of the map and of its colour bar: left, bottom, width, height in the figure; top of
+the legend."""
 MARK = 0.07
 """Length of the mark of a published crest, as a fraction of the height of the map."""
 OUTLINE = withStroke(linewidth=1.4, foreground="white", alpha=0.7)
@@ -121,7 +123,14 @@ def _map(
     axes.set_ylabel(STIFFNESS_LABEL)
     axes.xaxis.set_minor_locator(AutoMinorLocator())
     axes.yaxis.set_minor_locator(NullLocator())
-    figure.legend(handles=notes, loc="lower left", bbox_to_anchor=(MAP[0], 0.0), ncol=3)
+    figure.legend(
+        handles=notes,
+        loc="upper left",
+        bbox_to_anchor=(MAP[0], LEGEND),
+        ncol=4 if len(notes) <= 4 else 3,
+        borderpad=0,
+        borderaxespad=0,
+    )
     return figure
 
 

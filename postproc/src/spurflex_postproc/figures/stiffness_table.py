@@ -93,7 +93,10 @@ def _spreads(speed: Reals, amplitude: Reals, told: PublishedMap) -> list[str]:
         warnings.simplefilter("ignore", RuntimeWarning)  # speeds without any value
         low, middle, high = np.nanpercentile(amplitude, (5, 50, 95), axis=0)
     spread = 100 * (high - low) / middle
-    lines = []
+    lines = [
+        "  effect of the support stiffness on the amplitude (5th to 95th percentile over the"
+        " stiffnesses, relative to the median; typical is the median over the speeds)"
+    ]
     for first, last in (
         (float(speed[0]), told.flat[0]),
         told.flat,
@@ -102,8 +105,7 @@ def _spreads(speed: Reals, amplitude: Reals, told: PublishedMap) -> list[str]:
         inside = spread[(speed >= first) & (speed <= last) & np.isfinite(spread)]
         if inside.size:
             lines.append(
-                f"  amplitude varies with stiffness by {np.median(inside):.0f} %"
-                f" from {first:.0f} to {last:.0f} rev/min (median over speeds, 5th to 95th"
-                " percentile)"
+                f"    {first:>4.0f} to {last:.0f} rev/min: amplitude varies with stiffness by"
+                f" {np.median(inside):.0f} % typically, {inside.max():.0f} % at most"
             )
     return lines
