@@ -16,8 +16,8 @@ module spurflex_integrate_branch
    !> Parts into which a step is divided to look for crossings.
    integer, parameter :: parts = 16
 
-   !> Bisections that locate a zero of a polynomial to round-off.
-   integer, parameter :: bisections = 50
+   !> Iterations that locate a zero of a polynomial at most; about eight reach round-off.
+   integer, parameter :: most_iterations = 60
 
 contains
 
@@ -101,15 +101,47 @@ contains
          if (k == parts) return
       end do
       low = real(k - 1, wp)/real(parts, wp)
-      do k = 1, bisections
-         place = 0.5_wp*(low + high)
-         if (polynomial(c, place) < 0.0_wp) then
+      place = zero_between(c, low, high)
+   end subroutine first_zero
+
+   !> The zero of a polynomial that is positive at one end of an interval and negative at the other.
+   pure function zero_between(c, positive, negative) result(place)
+      !> Its coefficients, constant first.
+      real(wp), intent(in) :: c(0:nodes - 1)
+      !> The ends.
+      real(wp), intent(in) :: positive, negative
+      !> The zero.
+      real(wp) :: place
+
+      real(wp) :: low, high, at_low, at_high, value
+      integer :: k, side
+
+      ! False position; an end that stays twice loses half of its weight (the Illinois rule).
+      low = positive
+      high = negative
+      at_low = max(polynomial(c, low), 0.0_wp)
+      at_high = polynomial(c, high)
+      place = low
+      side = 0
+      do k = 1, most_iterations
+         if (.not. at_low - at_high > 0.0_wp) exit
+         value = place
+         place = (at_low*high - at_high*low)/(at_low - at_high)
+         if (abs(place - value) <= epsilon(1.0_wp)) exit
+         value = polynomial(c, place)
+         if (value < 0.0_wp) then
             high = place
+            at_high = value
+            if (side < 0) at_low = 0.5_wp*at_low
+            side = -1
          else
             low = place
+            at_low = value
+            if (side > 0) at_high = 0.5_wp*at_high
+            side = 1
          end if
       end do
-   end subroutine first_zero
+   end function zero_between
 
    !> Improve the place of a crossing from the deflection at the end of the part before it.
    pure subroutine refine_crossing(branch, next, deflection, half_backlash, longest, length, miss)

@@ -58,10 +58,8 @@ contains
       if (.not. same_support(self%equations, equations)) then
          call new_modal_system(equations, self%modal, error)
          if (allocated(error)) return
-         if (allocated(self%whole%carry_re)) deallocate (self%whole%carry_re, self%whole%carry_im, self%whole%taken_re, &
-                                                         self%whole%taken_im)
-         if (allocated(self%part%carry_re)) deallocate (self%part%carry_re, self%part%carry_im, self%part%taken_re, &
-                                                        self%part%taken_im)
+         self%whole = step_coefficients()
+         self%part = step_coefficients()
          self%size = 2*self%modal%modes
          if (allocated(self%weight)) deallocate (self%weight, self%deflection_weight)
          allocate (self%weight(self%size), self%deflection_weight(self%size), source=1.0_wp)

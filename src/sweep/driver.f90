@@ -6,6 +6,7 @@ module spurflex_sweep_driver
    use spurflex_base_kinds, only: wp
    use spurflex_base_text, only: to_text, fixed_text
    use spurflex_external_posix, only: remove_file
+   use spurflex_external_threads, only: use_one_thread
    use spurflex_io_agreement, only: share_error
    use spurflex_io_case, only: case_type
    use spurflex_io_deck, only: read_deck, parse_deck
@@ -71,6 +72,7 @@ contains
       integer :: ranks, total(outcomes), finished(outcomes)
 
       code = exit_complete
+      call use_one_thread()
       call mpi_comm_size(comm, ranks)
       call log%say(describe_plan(case))
       call open_file(results, case, comm, fresh, error)
