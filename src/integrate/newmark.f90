@@ -1,7 +1,7 @@
 !> Newmark's method with a constant step, for any beta and gamma.
 !>
-!> With S = M + gamma dt C + beta dt^2 K, factorised once with LAPACK, a step is linear in the state w = [q, q'] and in the mesh force
-!> at its two ends,
+!> With S = M + gamma dt C + beta dt^2 K, factorised once with LAPACK, a step is linear in the state w = [q, q'] and in
+!> the mesh force at its two ends,
 !>
 !>     w_1 = A w_0 - (f_0 - F) b_0 - (f_1 - F) b_1
 !>
