@@ -9,18 +9,22 @@ module spurflex_steady_lyapunov
 
    public :: lyapunov_sum
 
-   !> Mesh periods of a block: longer than the memory of the motion.
-   integer, parameter :: block = 32
+   !> Mesh periods of the first blocks.
+   integer, parameter :: first_length = 16
+
+   !> Blocks at most; when they are full, neighbours are joined. Growth that only wanders, as on a torus, then averages out
+   !> within the blocks and does not count as an error of the exponent.
+   integer, parameter :: most_blocks = 32
 
    !> Growth of a tangent, block by block.
    type :: lyapunov_sum
       private
-      !> Mesh periods in the open block, growth over it.
-      integer :: periods = 0
-      real(wp) :: growth = 0.0_wp
-      !> Blocks closed; sums of the growth per period and of its square.
+      !> Mesh periods of a block; mesh periods in the open one, and growth over it.
+      integer :: length = first_length, periods = 0
+      real(wp) :: open = 0.0_wp
+      !> Closed blocks, and growth over each.
       integer :: blocks = 0
-      real(wp) :: total = 0.0_wp, total_square = 0.0_wp
+      real(wp) :: growth(most_blocks) = 0.0_wp
    contains
       !> Begin anew.
       procedure :: reset
@@ -37,11 +41,10 @@ contains
       !> Sum.
       class(lyapunov_sum), intent(inout) :: self
 
+      self%length = first_length
       self%periods = 0
-      self%growth = 0.0_wp
+      self%open = 0.0_wp
       self%blocks = 0
-      self%total = 0.0_wp
-      self%total_square = 0.0_wp
    end subroutine reset
 
    !> Take the tangent after a period and make it a unit again.
@@ -53,19 +56,21 @@ contains
       !> Tangent of unit norm a period ago; of unit norm again afterwards, shape (size).
       real(wp), intent(inout) :: tangent(:)
 
-      real(wp) :: norm, rate
+      real(wp) :: norm
 
       norm = max(weighted_norm(weight, tangent), tiny(1.0_wp))
       tangent = tangent/norm
-      self%growth = self%growth + log(norm)
+      self%open = self%open + log(norm)
       self%periods = self%periods + 1
-      if (self%periods < block) return
-      rate = self%growth/real(block, wp)
+      if (self%periods < self%length) return
       self%blocks = self%blocks + 1
-      self%total = self%total + rate
-      self%total_square = self%total_square + rate**2
+      self%growth(self%blocks) = self%open
       self%periods = 0
-      self%growth = 0.0_wp
+      self%open = 0.0_wp
+      if (self%blocks < most_blocks) return
+      self%growth(:most_blocks/2) = self%growth(1::2) + self%growth(2::2)
+      self%blocks = most_blocks/2
+      self%length = 2*self%length
    end subroutine add
 
    !> Exponent and its standard error; the error is infinite before there are two blocks.
@@ -79,16 +84,16 @@ contains
       !> Mesh periods summed over.
       integer, intent(out) :: periods
 
-      real(wp) :: variance
+      real(wp) :: rate(self%blocks)
 
       exponent = 0.0_wp
       error = huge(1.0_wp)
-      periods = self%blocks*block
+      periods = self%blocks*self%length
       if (self%blocks < 1) return
-      exponent = self%total/real(self%blocks, wp)
+      rate = self%growth(:self%blocks)/real(self%length, wp)
+      exponent = sum(rate)/real(self%blocks, wp)
       if (self%blocks < 2) return
-      variance = max(self%total_square/real(self%blocks, wp) - exponent**2, 0.0_wp)
-      error = sqrt(variance/real(self%blocks - 1, wp))
+      error = sqrt(sum((rate - exponent)**2)/real(self%blocks*(self%blocks - 1), wp))
    end subroutine mean_growth
 
 end module spurflex_steady_lyapunov
