@@ -74,7 +74,7 @@ contains
    end subroutine add
 
    !> Exponent and its standard error; the error is infinite before there are two blocks.
-   pure subroutine mean_growth(self, exponent, error, periods)
+   pure subroutine mean_growth(self, exponent, error, periods, wander)
       !> Sum.
       class(lyapunov_sum), intent(in) :: self
       !> Largest Lyapunov exponent [1/mesh period].
@@ -83,9 +83,21 @@ contains
       real(wp), intent(out) :: error
       !> Mesh periods summed over.
       integer, intent(out) :: periods
+      !> Range that the logarithm of the tangent covered, block by block.
+      real(wp), intent(out) :: wander
 
-      real(wp) :: rate(self%blocks)
+      real(wp) :: rate(self%blocks), logarithm, low, high
+      integer :: k
 
+      logarithm = 0.0_wp
+      low = 0.0_wp
+      high = 0.0_wp
+      do k = 1, self%blocks
+         logarithm = logarithm + self%growth(k)
+         low = min(low, logarithm)
+         high = max(high, logarithm)
+      end do
+      wander = high - low
       exponent = 0.0_wp
       error = huge(1.0_wp)
       periods = self%blocks*self%length
@@ -93,7 +105,8 @@ contains
       rate = self%growth(:self%blocks)/real(self%length, wp)
       exponent = sum(rate)/real(self%blocks, wp)
       if (self%blocks < 2) return
-      error = sqrt(sum((rate - exponent)**2)/real(self%blocks*(self%blocks - 1), wp))
+      ! Blocks of growth that only wanders are not independent: their sum errs by no more than the range.
+      error = min(sqrt(sum((rate - exponent)**2)/real(self%blocks*(self%blocks - 1), wp)), wander/real(periods, wp))
    end subroutine mean_growth
 
 end module spurflex_steady_lyapunov

@@ -41,9 +41,12 @@ module spurflex_steady_search
    !> Standard errors by which an exponent must differ from zero.
    real(wp), parameter :: significance = 4.0_wp
 
-   !> Growth of a tangent that says nothing, however long it is summed: on a torus it grows in proportion to time and
-   !> wanders by a few units of its logarithm.
+   !> Growth of a tangent, in units of its logarithm, that says nothing however long it is summed: on a torus it wanders by a
+   !> few units. Over T periods an exponent below this over T is therefore called zero.
    real(wp), parameter :: neutral_growth = 10.0_wp
+
+   !> Mesh periods over which a motion that is called quasi-periodic must have been watched.
+   integer, parameter :: fewest_periods = 512
 
    !> Distance of the sections of a motion, beside its size, that is none.
    real(wp), parameter :: same_section = 1.0e-6_wp
@@ -263,15 +266,15 @@ contains
       !> The motion.
       type(steady_motion), intent(inout) :: motion
 
-      real(wp) :: neutral
+      real(wp) :: neutral, wander
       integer :: periods
 
-      call transient%growth%exponent(motion%lyapunov_exponent, motion%lyapunov_error, periods)
+      call transient%growth%exponent(motion%lyapunov_exponent, motion%lyapunov_error, periods, wander)
       neutral = neutral_growth/real(max(periods, 1), wp)
       motion%status = status_settled
       if (motion%lyapunov_exponent > neutral + significance*motion%lyapunov_error) then
          motion%motion = motion_chaotic
-      else if (abs(motion%lyapunov_exponent) < neutral .and. significance*motion%lyapunov_error < neutral) then
+      else if (wander <= neutral_growth .and. periods >= fewest_periods) then
          motion%motion = motion_quasi_periodic
       else
          motion%motion = motion_unresolved
