@@ -81,7 +81,7 @@ def test_motion_strip_holds_the_classes(curve_file: Path, tmp_path: Path) -> Non
     rows = {item.get_gid(): np.ravel(item.get_array()) for item in axes.collections}
     names = [name for name, _, _ in CLASSES]
     assert [names[at] for at in rows["rigid, motion"][:8]] == [
-        *("1T", "2T", "3T", "4T to 8T", "4T to 8T", "quasi-periodic", "chaotic", "unresolved")
+        *("1T", "2T", "3T", "4T and more", "4T and more", "quasi-periodic", "chaotic", "unresolved")
     ]
     assert names[rows["flexible, motion"][9]] == "no value"
     assert [text.get_text() for text in axes.get_legend().get_texts()][:-1] == names

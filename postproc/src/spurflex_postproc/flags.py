@@ -9,7 +9,10 @@ NO_VALUE = -1
 """Stands in a masked integer variable where the point has no value."""
 
 LARGEST_PERIOD = 8
-"""Largest multiple of the mesh period that `motion` tells apart."""
+"""Largest multiple of the mesh period that is its own flag of `motion`."""
+
+LONG_PERIOD = 100
+"""Added to the multiple in the flag of a motion that takes longer to repeat."""
 
 
 class Status(IntEnum):
@@ -19,6 +22,7 @@ class Status(IntEnum):
     SETTLED = 1
     NOT_SETTLED = 2
     DIVERGED = 3
+    INACCURATE = 4
 
 
 class Motion(IntEnum):
@@ -38,7 +42,7 @@ def has_value(status: ArrayLike) -> NDArray[np.bool_]:
     Returns:
         True where the point holds values, same shape.
     """
-    return np.isin(np.asarray(status), (Status.SETTLED, Status.NOT_SETTLED))
+    return np.isin(np.asarray(status), (Status.SETTLED, Status.NOT_SETTLED, Status.INACCURATE))
 
 
 def is_regular(status: ArrayLike, motion: ArrayLike) -> NDArray[np.bool_]:
@@ -55,6 +59,6 @@ def is_regular(status: ArrayLike, motion: ArrayLike) -> NDArray[np.bool_]:
         True where the motion is periodic, same shape.
     """
     status, motion = np.asarray(status), np.asarray(motion)
-    periodic = (motion >= 1) & (motion <= LARGEST_PERIOD)
+    periodic = ((motion >= 1) & (motion <= LARGEST_PERIOD)) | (motion > LONG_PERIOD)
     settled_unknown = (motion == Motion.UNRESOLVED) & (status == Status.SETTLED)
     return np.asarray(has_value(status) & (periodic | settled_unknown))

@@ -19,11 +19,12 @@ class Coverage:
     settled: int
     not_settled: int
     diverged: int
+    inaccurate: int
 
     @property
     def total(self) -> int:
         """Number of points of the grid."""
-        return self.missing + self.settled + self.not_settled + self.diverged
+        return self.missing + self.settled + self.not_settled + self.diverged + self.inaccurate
 
     @property
     def settled_fraction(self) -> float:
@@ -34,7 +35,7 @@ class Coverage:
         return (
             f"{100 * self.settled_fraction:.1f} % of {self.total} points settled"
             f" ({self.not_settled} not settled, {self.missing} missing,"
-            f" {self.diverged} diverged)"
+            f" {self.diverged} diverged, {self.inaccurate} less accurate than asked for)"
         )
 
 

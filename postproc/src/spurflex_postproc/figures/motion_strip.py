@@ -12,13 +12,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from spurflex_postproc import style
 from spurflex_postproc.figures.scale import edges
-from spurflex_postproc.flags import LARGEST_PERIOD, NO_VALUE, Motion
+from spurflex_postproc.flags import LARGEST_PERIOD, LONG_PERIOD, NO_VALUE, Motion
+
+LONGER_PERIODS = (*range(4, LARGEST_PERIOD + 1), *range(LONG_PERIOD, 2 * LONG_PERIOD))
+"""Flags of the periods that share a class."""
 
 CLASSES: tuple[tuple[str, str, tuple[int, ...]], ...] = (
     ("1T", style.SILVER, (1,)),
     ("2T", style.SKY_BLUE, (2,)),
     ("3T", style.NAVY, (3,)),
-    (f"4T to {LARGEST_PERIOD}T", style.GREEN, tuple(range(4, LARGEST_PERIOD + 1))),
+    ("4T and more", style.GREEN, LONGER_PERIODS),
     ("quasi-periodic", style.YELLOW, (Motion.QUASI_PERIODIC,)),
     ("chaotic", style.PURPLE, (Motion.CHAOTIC,)),
     ("unresolved", style.BLACK, (Motion.UNRESOLVED,)),
