@@ -25,7 +25,7 @@ if(CMAKE_Fortran_COMPILER_ID STREQUAL "GNU")
       # Release: nothing here changes a rounding; both only drop the bookkeeping of errno and traps.
       "$<$<CONFIG:Release,RelWithDebInfo>:-fno-trapping-math;-fno-math-errno;${spurflex_march}>"
       # Debug: stop at the first wrong index, unset real or invalid operation.
-      "$<$<CONFIG:Debug>:-O0;-fcheck=all;-ffpe-trap=invalid,zero,overflow;-finit-real=snan>"
+      "$<$<CONFIG:Debug>:-O0;-fcheck=all,no-array-temps;-ffpe-trap=invalid,zero,overflow;-finit-real=snan>"
       "$<$<CONFIG:Debug>:-fbacktrace;-Werror>"
       # gfortran takes descriptors of allocatables and hidden lengths of characters for unset; without
       # optimization it is right about the variables that are plainly so.

@@ -13,7 +13,7 @@ module spurflex_integrate_collocation
    use spurflex_integrate_mesh_table, only: mesh_points, set_mesh_points
    use spurflex_integrate_period_map, only: period_map, orbit_type, observables, reserve_orbit
    use spurflex_model_equations, only: equations_type
-   use spurflex_model_modal, only: modal_system, new_modal_system
+   use spurflex_model_modal, only: modal_system, new_modal_system, same_modes
    implicit none
    private
 
@@ -21,6 +21,10 @@ module spurflex_integrate_collocation
 
    !> Weights of the Lobatto points in an integral over the step.
    real(wp), parameter :: quadrature(nodes) = [0.05_wp, 49.0_wp/180.0_wp, 16.0_wp/45.0_wp, 49.0_wp/180.0_wp, 0.05_wp]
+
+   !> Distance from the border, beside the static deflection, at which a crossing counts as located: the mesh force is continuous
+   !> there, so that its error is the square of this.
+   real(wp), parameter :: tolerated_miss = 1.0e-6_wp
 
    !> Period map by exponential collocation. The state holds the real parts of the modes, then the imaginary parts.
    type, extends(period_map) :: collocation_map
@@ -38,6 +42,7 @@ module spurflex_integrate_collocation
       procedure :: advance => advance_collocation
       procedure :: to_state => modes_from_coordinates
       procedure :: from_state => coordinates_from_modes
+      procedure :: deflection_bound => sum_of_moduli
    end type collocation_map
 
 contains
@@ -56,14 +61,14 @@ contains
       real(wp) :: h
       integer :: s, k
 
-      if (.not. same_support(self%equations, equations)) then
+      if (.not. same_modes(self%equations, equations)) then
          call new_modal_system(equations, self%modal, error)
          if (allocated(error)) return
          self%whole = step_coefficients()
          self%part = step_coefficients()
          self%size = 2*self%modal%modes
-         if (allocated(self%weight)) deallocate (self%weight, self%deflection_weight)
-         allocate (self%weight(self%size), self%deflection_weight(self%size), source=1.0_wp)
+         if (allocated(self%weight)) deallocate (self%weight)
+         allocate (self%weight(self%size), source=1.0_wp)
          do k = 1, self%modal%modes
             self%weight([k, self%modal%modes + k]) = max(1.0_wp, maxval(abs(self%modal%observation(:, k))))
          end do
@@ -82,20 +87,6 @@ contains
          call set_mesh_points(equations, h*real(s - 1, wp), h, self%table(s))
       end do
    end subroutine load_collocation
-
-   !> Two points have the same linear part, whatever their speeds.
-   pure function same_support(a, b) result(same)
-      !> Equations of motion of both.
-      type(equations_type), intent(in) :: a, b
-      !> The modes of one are those of the other.
-      logical :: same
-
-      same = a%n == b%n
-      if (same) same = .not. (any(abs(a%stiffness - b%stiffness) > 0.0_wp) .or. any(abs(a%damping - b%damping) > 0.0_wp) &
-                              .or. any(abs(a%mass - b%mass) > 0.0_wp) .or. any(abs(a%direction - b%direction) > 0.0_wp) &
-                              .or. abs(a%mesh%mean_stiffness - b%mesh%mean_stiffness) > 0.0_wp &
-                              .or. abs(a%mesh%damping - b%mesh%damping) > 0.0_wp)
-   end function same_support
 
    !> Advance a state by one mesh period.
    subroutine advance_collocation(self, state, tangents, orbit)
@@ -172,7 +163,7 @@ contains
             call set_mesh_points(self%equations, h*real(s - 1, wp) + start, cut, mesh)
             call solve_step(self%part, mesh, branch, state, alpha, force, shift)
             call refine_crossing(branch, next, mesh%deflection + shift, self%half_backlash, whole_length, cut, miss)
-            if (abs(miss) <= epsilon(1.0_wp)**0.5_wp*abs(self%equations%static_deflection) .or. tries == most_tries) exit
+            if (abs(miss) <= tolerated_miss*max(abs(self%equations%static_deflection), self%half_backlash)) exit
          end do
          call commit(self%part, mesh)
       end subroutine cut_at_crossing
@@ -272,5 +263,20 @@ contains
       position = w(:self%equations%n)
       velocity = w(self%equations%n + 1:)
    end subroutine coordinates_from_modes
+
+   !> Bound of what a difference of states does to the mesh deflection.
+   pure function sum_of_moduli(self, difference) result(bound)
+      !> Map.
+      class(collocation_map), intent(in) :: self
+      !> Difference of two states, shape (size).
+      real(wp), intent(in) :: difference(:)
+      !> Sum of the moduli of its modes [m].
+      real(wp) :: bound
+
+      integer :: m
+
+      m = self%modal%modes
+      bound = sum(sqrt(difference(:m)**2 + difference(m + 1:)**2))
+   end function sum_of_moduli
 
 end module spurflex_integrate_collocation

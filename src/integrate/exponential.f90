@@ -19,6 +19,9 @@ module spurflex_integrate_exponential
    !> Points of a step.
    integer, parameter :: nodes = 5
 
+   !> Modes that are taken together: one AVX-512 register or two AVX2 registers of doubles.
+   integer, parameter :: width = 8
+
    !> Outer inner Lobatto point, (1 - sqrt(3/7))/2.
    real(wp), parameter :: c2 = 0.172673164646011428100853771876_wp
 
@@ -29,8 +32,6 @@ module spurflex_integrate_exponential
    type :: step_coefficients
       !> Length [s].
       real(wp) :: length = 0.0_wp
-      !> What drives the modes, shape (modes).
-      real(wp), allocatable :: influence_re(:), influence_im(:)
       !> exp(lambda c_i h), shape (modes, nodes).
       real(wp), allocatable :: carry_re(:, :), carry_im(:, :)
       !> What the value of N at point j takes from the mode at point i, shape (modes, j, i).
@@ -56,6 +57,13 @@ module spurflex_integrate_exponential
    !> Terms of the series at most.
    integer, parameter :: most_terms = 30
 
+   !> 1/m for the series and its recurrence.
+   real(wp), parameter :: reciprocal(most_terms + nodes) = 1.0_wp/[ &
+                             1.0_wp, 2.0_wp, 3.0_wp, 4.0_wp, 5.0_wp, 6.0_wp, 7.0_wp, 8.0_wp, 9.0_wp, 10.0_wp, 11.0_wp, &
+                             12.0_wp, 13.0_wp, 14.0_wp, 15.0_wp, 16.0_wp, 17.0_wp, 18.0_wp, 19.0_wp, 20.0_wp, 21.0_wp, &
+                             22.0_wp, 23.0_wp, 24.0_wp, 25.0_wp, 26.0_wp, 27.0_wp, 28.0_wp, 29.0_wp, 30.0_wp, 31.0_wp, &
+                             32.0_wp, 33.0_wp, 34.0_wp, 35.0_wp]
+
    !> Last term of the series, beside the first, that still counts: round-off.
    real(wp), parameter :: last_term = 1.0e-17_wp
 
@@ -73,40 +81,37 @@ contains
       !> The coefficients.
       type(step_coefficients), intent(inout) :: step
 
-      real(wp), dimension(modal%modes) :: y_re, y_im
-      real(wp), dimension(modal%modes, 0:last) :: re, im
-      real(wp) :: power, product
-      integer :: i, j, m, k
+      real(wp), dimension(width) :: y_re, y_im, b_re, b_im, c_re, c_im
+      real(wp), dimension(width, nodes) :: t_re, t_im
+      integer :: i, j, k, first, last_mode, n
 
       if (.not. allocated(step%carry_re)) call allocate_step(modal, step)
       step%length = length
-      step%taken_re = 0.0_wp
-      step%taken_im = 0.0_wp
+      do first = 1, modal%modes, width
+         last_mode = min(first + width - 1, modal%modes)
+         n = last_mode - first + 1
+         y_re = 0.0_wp
+         y_im = 0.0_wp
+         b_re = 0.0_wp
+         b_im = 0.0_wp
+         do k = 1, n
+            y_re(k) = length*real(modal%rate(first + k - 1), wp)
+            y_im(k) = length*aimag(modal%rate(first + k - 1))
+            b_re(k) = length*real(modal%influence(first + k - 1), wp)
+            b_im(k) = length*aimag(modal%influence(first + k - 1))
+         end do
+         do i = 2, nodes
+            call set_point(i, y_re, y_im, b_re, b_im, c_re, c_im, t_re, t_im)
+            step%carry_re(first:last_mode, i) = c_re(:n)
+            step%carry_im(first:last_mode, i) = c_im(:n)
+            do j = 1, nodes
+               step%taken_re(first:last_mode, j, i) = t_re(:n, j)
+               step%taken_im(first:last_mode, j, i) = t_im(:n, j)
+            end do
+         end do
+      end do
       do i = 2, nodes
-         y_re = node(i)*length*real(modal%rate, wp)
-         y_im = node(i)*length*aimag(modal%rate)
-         call small_moments(y_re, y_im, re, im, step%carry_re(:, i), step%carry_im(:, i))
-         do k = 1, modal%modes
-            if (abs(y_re(k)) + abs(y_im(k)) > small) then
-               call large_moments(y_re(k), y_im(k), re(k, :), im(k, :), step%carry_re(k, i), step%carry_im(k, i))
-            end if
-         end do
-         power = length
-         do m = 0, last
-            power = power*node(i)
-            do k = 1, modal%modes
-               product = power*(step%influence_re(k)*re(k, m) - step%influence_im(k)*im(k, m))
-               im(k, m) = power*(step%influence_re(k)*im(k, m) + step%influence_im(k)*re(k, m))
-               re(k, m) = product
-            end do
-         end do
          do j = 1, nodes
-            do m = 0, last
-               do k = 1, modal%modes
-                  step%taken_re(k, j, i) = step%taken_re(k, j, i) + lagrange(m, j)*re(k, m)
-                  step%taken_im(k, j, i) = step%taken_im(k, j, i) + lagrange(m, j)*im(k, m)
-               end do
-            end do
             step%taken(i, j) = sum(step%taken_re(:, j, i))
          end do
       end do
@@ -122,51 +127,105 @@ contains
       allocate (step%carry_re(modal%modes, nodes), source=1.0_wp)
       allocate (step%carry_im(modal%modes, nodes), source=0.0_wp)
       allocate (step%taken_re(modal%modes, nodes, nodes), step%taken_im(modal%modes, nodes, nodes), source=0.0_wp)
-      allocate (step%influence_re(modal%modes), step%influence_im(modal%modes))
-      step%influence_re = real(modal%influence, wp)
-      step%influence_im = aimag(modal%influence)
    end subroutine allocate_step
 
-   !> The moments of many small arguments: downwards from the series J_4 = 1/5 (1 + y/6 (1 + y/7 (1 + ...))).
-   pure subroutine small_moments(y_re, y_im, re, im, carry_re, carry_im)
-      !> Arguments, shape (n).
-      real(wp), intent(in), contiguous :: y_re(:), y_im(:)
-      !> J_0..J_4 of each, shape (n, 0:4); meaningless where the argument is large.
-      real(wp), intent(out) :: re(size(y_re), 0:last), im(size(y_re), 0:last)
-      !> exp(y) of each, shape (n).
-      real(wp), intent(out) :: carry_re(size(y_re)), carry_im(size(y_re))
+   !> Coefficients of one point of the step, a vector of modes at a time.
+   pure subroutine set_point(i, x_re, x_im, b_re, b_im, carry_re, carry_im, taken_re, taken_im)
+      !> The point.
+      integer, intent(in) :: i
+      !> lambda h.
+      real(wp), intent(in) :: x_re(width), x_im(width)
+      !> h b.
+      real(wp), intent(in) :: b_re(width), b_im(width)
+      !> exp(c_i lambda h).
+      real(wp), intent(out) :: carry_re(width), carry_im(width)
+      !> What each value of N takes.
+      real(wp), intent(out) :: taken_re(width, nodes), taken_im(width, nodes)
 
-      real(wp), dimension(size(y_re)) :: sum_re, sum_im
+      real(wp), dimension(width) :: y_re, y_im, power_re, power_im
+      real(wp), dimension(width, 0:last) :: re, im
+      real(wp) :: product
+      integer :: j, k, m
+
+      do k = 1, width
+         y_re(k) = node(i)*x_re(k)
+         y_im(k) = node(i)*x_im(k)
+         power_re(k) = b_re(k)
+         power_im(k) = b_im(k)
+      end do
+      call small_moments(y_re, y_im, re, im)
+      do k = 1, width
+         carry_re(k) = 1.0_wp + y_re(k)*re(k, 0) - y_im(k)*im(k, 0)
+         carry_im(k) = y_re(k)*im(k, 0) + y_im(k)*re(k, 0)
+      end do
+      if (any(abs(y_re) + abs(y_im) > small)) then
+         do k = 1, width
+            if (abs(y_re(k)) + abs(y_im(k)) > small) then
+               call large_moments(y_re(k), y_im(k), re(k, :), im(k, :), carry_re(k), carry_im(k))
+            end if
+         end do
+      end if
+      do m = 0, last
+         do k = 1, width
+            power_re(k) = node(i)*power_re(k)
+            power_im(k) = node(i)*power_im(k)
+            product = power_re(k)*re(k, m) - power_im(k)*im(k, m)
+            im(k, m) = power_re(k)*im(k, m) + power_im(k)*re(k, m)
+            re(k, m) = product
+         end do
+      end do
+      do j = 1, nodes
+         do k = 1, width
+            taken_re(k, j) = lagrange(0, j)*re(k, 0) + lagrange(1, j)*re(k, 1) + lagrange(2, j)*re(k, 2) &
+                             + lagrange(3, j)*re(k, 3) + lagrange(4, j)*re(k, 4)
+            taken_im(k, j) = lagrange(0, j)*im(k, 0) + lagrange(1, j)*im(k, 1) + lagrange(2, j)*im(k, 2) &
+                             + lagrange(3, j)*im(k, 3) + lagrange(4, j)*im(k, 4)
+         end do
+      end do
+   end subroutine set_point
+
+   !> The moments of small arguments: downwards from the series J_4 = 1/5 (1 + y/6 (1 + y/7 (1 + ...))).
+   pure subroutine small_moments(y_re, y_im, re, im)
+      !> Arguments.
+      real(wp), intent(in) :: y_re(width), y_im(width)
+      !> J_0..J_4 of each; meaningless where the argument is large.
+      real(wp), intent(out) :: re(width, 0:last), im(width, 0:last)
+
+      real(wp), dimension(width) :: sum_re, sum_im
       real(wp) :: largest, term, inverse, product
       integer :: k, m, terms
 
-      largest = min(maxval(abs(y_re) + abs(y_im)), small)
+      largest = 0.0_wp
+      do k = 1, width
+         largest = max(largest, abs(y_re(k)) + abs(y_im(k)))
+      end do
+      largest = min(largest, small)
       term = 1.0_wp
-      do terms = 1, most_terms
-         term = term*largest/real(terms + nodes, wp)
+      do terms = 1, most_terms - 1
+         term = term*largest*reciprocal(terms + nodes)
          if (term < last_term) exit
       end do
       sum_re = 1.0_wp
       sum_im = 0.0_wp
-      do m = min(terms, most_terms), 1, -1
-         inverse = 1.0_wp/real(m + nodes, wp)
-         do k = 1, size(y_re)
+      do m = terms, 1, -1
+         inverse = reciprocal(m + nodes)
+         do k = 1, width
             product = inverse*(sum_re(k)*y_re(k) - sum_im(k)*y_im(k))
             sum_im(k) = inverse*(sum_re(k)*y_im(k) + sum_im(k)*y_re(k))
             sum_re(k) = 1.0_wp + product
          end do
       end do
-      re(:, last) = sum_re/real(nodes, wp)
-      im(:, last) = sum_im/real(nodes, wp)
+      do k = 1, width
+         re(k, last) = sum_re(k)*reciprocal(nodes)
+         im(k, last) = sum_im(k)*reciprocal(nodes)
+      end do
       do m = last, 1, -1
-         inverse = 1.0_wp/real(m, wp)
-         do k = 1, size(y_re)
+         inverse = reciprocal(m)
+         do k = 1, width
             re(k, m - 1) = inverse*(y_re(k)*re(k, m) - y_im(k)*im(k, m) + 1.0_wp)
             im(k, m - 1) = inverse*(y_re(k)*im(k, m) + y_im(k)*re(k, m))
          end do
       end do
-      carry_re = 1.0_wp + y_re*re(:, 0) - y_im*im(:, 0)
-      carry_im = y_re*im(:, 0) + y_im*re(:, 0)
    end subroutine small_moments
 
    !> The moments of a large argument: upwards from J_0 = (exp(y) - 1)/y.

@@ -14,7 +14,8 @@ module spurflex_integrate_newmark
    use spurflex_integrate_contact, only: contact_force
    use spurflex_integrate_period_map, only: period_map, orbit_type, observables, reserve_orbit
    use spurflex_model_equations, only: equations_type
-   use spurflex_model_mesh, only: mesh_force, mesh_stiffness, transmission_error, transmission_error_rate
+   use spurflex_model_mesh, only: mesh_stiffness, transmission_error, transmission_error_rate
+   use spurflex_model_modal, only: modal_system, new_modal_system, same_modes
    implicit none
    private
 
@@ -26,7 +27,9 @@ module spurflex_integrate_newmark
       real(wp) :: beta = 0.25_wp, gamma = 0.5_wp
       !> Equations of motion of the point.
       type(equations_type), private :: equations
-      !> The step: A transposed, b_0, b_1; shapes (size, size) and (size).
+      !> Modes of their linear part.
+      type(modal_system), private :: modal
+      !> The step: A, b_0, b_1; shapes (size, size) and (size).
       real(wp), allocatable, private :: carry(:, :), before(:), after(:)
       !> Rows that give the mesh deflection and its rate, shape (size, 2).
       real(wp), allocatable, private :: deflection_row(:, :)
@@ -39,6 +42,7 @@ module spurflex_integrate_newmark
       procedure :: advance => advance_newmark
       procedure :: to_state => state_from_coordinates
       procedure :: from_state => coordinates_from_state
+      procedure :: deflection_bound => sum_of_moduli
    end type newmark_map
 
 contains
@@ -59,6 +63,10 @@ contains
       integer :: n, i, s
 
       n = equations%n
+      if (.not. same_modes(self%equations, equations)) then
+         call new_modal_system(equations, self%modal, error)
+         if (allocated(error)) return
+      end if
       self%equations = equations
       self%size = 2*n
       self%steps = steps
@@ -82,7 +90,6 @@ contains
       reference = sqrt(equations%mesh%mean_stiffness*dot_product(equations%direction, &
                                                                  matmul(inverse_mass, equations%direction)))
       self%weight = [abs(equations%direction), abs(equations%direction)/reference]
-      self%deflection_weight = self%weight
       do i = 1, n
          self%weight(i) = max(self%weight(i), maxval(abs(equations%observation(:, i))))
          self%weight(n + i) = max(self%weight(n + i), maxval(abs(equations%observation(:, i)))/reference)
@@ -283,5 +290,17 @@ contains
       position = state(:self%equations%n)
       velocity = state(self%equations%n + 1:)
    end subroutine coordinates_from_state
+
+   !> Bound of what a difference of states does to the mesh deflection.
+   pure function sum_of_moduli(self, difference) result(bound)
+      !> Map.
+      class(newmark_map), intent(in) :: self
+      !> Difference of two states, shape (size).
+      real(wp), intent(in) :: difference(:)
+      !> Sum of the moduli of its modes [m].
+      real(wp) :: bound
+
+      bound = sum(abs(matmul(self%modal%to_modes, cmplx(difference, 0.0_wp, wp))))
+   end function sum_of_moduli
 
 end module spurflex_integrate_newmark

@@ -41,8 +41,6 @@ module spurflex_integrate_period_map
       !> Bound of what a unit of each component of the state does to y1, to a bearing deformation and to the mesh deflection,
       !> shape (size).
       real(wp), allocatable :: weight(:)
-      !> Bound of what a unit of each component does to the mesh deflection alone, then and later, shape (size).
-      real(wp), allocatable :: deflection_weight(:)
    contains
       !> Take an operating point and a number of steps per period.
       procedure(load_interface), deferred :: load
@@ -52,6 +50,8 @@ module spurflex_integrate_period_map
       procedure(to_state_interface), deferred :: to_state
       !> The coordinates of the equations of motion from the state.
       procedure(from_state_interface), deferred :: from_state
+      !> How far a difference of states can move the mesh deflection, now and later.
+      procedure(bound_interface), deferred :: deflection_bound
    end type period_map
 
    abstract interface
@@ -106,6 +106,18 @@ module spurflex_integrate_period_map
          !> Its rate, shape (n).
          real(wp), allocatable, intent(out) :: velocity(:)
       end subroutine from_state_interface
+
+      !> Bound of what a difference of states does to the mesh deflection, now and later, while contact is kept: the sum of the
+      !> moduli of the modes, which decay one by one under the mean mesh stiffness.
+      pure function bound_interface(self, difference) result(bound)
+         import :: period_map, wp
+         !> Map.
+         class(period_map), intent(in) :: self
+         !> Difference of two states, shape (size).
+         real(wp), intent(in) :: difference(:)
+         !> The bound [m].
+         real(wp) :: bound
+      end function bound_interface
    end interface
 
 contains

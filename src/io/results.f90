@@ -41,7 +41,7 @@ module spurflex_io_results
 contains
 
    !> Make a new result file under another name, rename it, and open it on every rank. All ranks call this together.
-   subroutine create_results(results, case, comm, provenance, error)
+   subroutine create_results(results, case, comm, provenance, replace, error)
       !> The open file.
       type(results_file), intent(out) :: results
       !> What is computed.
@@ -50,6 +50,8 @@ contains
       type(MPI_Comm), intent(in) :: comm
       !> What computes it.
       type(provenance_type), intent(in) :: provenance
+      !> Replace a file of that name, once the new one stands.
+      logical, intent(in) :: replace
       !> Set on every rank if the file exists, another run has it, or it cannot be made.
       type(error_type), allocatable, intent(out) :: error
 
@@ -62,7 +64,7 @@ contains
       call mpi_comm_rank(comm, rank)
       if (rank == 0) then
          call acquire_lock(results%lock, lock_path(case), error)
-         if (.not. allocated(error)) call make_file(case%output%file, case, provenance, error)
+         if (.not. allocated(error)) call make_file(case%output%file, case, provenance, replace, error)
       end if
       call open_shared(results, case, error)
    end subroutine create_results
@@ -181,7 +183,7 @@ contains
       !> Set if they cannot be written.
       type(error_type), allocatable, intent(out) :: error
 
-      real(wp) :: eta(2, size(responses))
+      real(wp) :: eta(3, size(responses))
 
       eta = nan()
       call require(size(results%rigid%variables) > 0, error)
@@ -198,13 +200,13 @@ contains
       integer, intent(in) :: first_speed
       !> Responses at consecutive speeds, shape (points).
       type(response), intent(in) :: responses(:)
-      !> Change of each bearing's largest deformation by the flexible support [percent], shape (2, points);
+      !> Change of each bearing's largest deformation by the flexible support and its error [percent], shape (3, points);
       !> not written if the rigid support is not asked for, NaN if absent.
       real(wp), intent(in), optional :: eta(:, :)
       !> Set if they cannot be written.
       type(error_type), allocatable, intent(out) :: error
 
-      real(wp) :: known_eta(2, size(responses))
+      real(wp) :: known_eta(3, size(responses))
 
       known_eta = nan()
       if (present(eta)) known_eta = eta
@@ -214,20 +216,22 @@ contains
    end subroutine write_flexible
 
    !> Make the file under another name, so that what has the final name is always whole.
-   subroutine make_file(path, case, provenance, error)
+   subroutine make_file(path, case, provenance, replace, error)
       !> Path of the file.
       character(len=*), intent(in) :: path
       !> What is computed.
       type(case_type), intent(in) :: case
       !> What computes it.
       type(provenance_type), intent(in) :: provenance
+      !> Replace a file of that name.
+      logical, intent(in) :: replace
       !> Set if the file exists or cannot be made.
       type(error_type), allocatable, intent(out) :: error
 
       logical :: exists
 
       inquire (file=path, exist=exists)
-      if (exists) then
+      if (exists .and. .not. replace) then
          call fatal_error(error, "the result file '"//path//"' exists already", exit_mismatch)
          return
       end if

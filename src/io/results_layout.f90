@@ -89,6 +89,8 @@ module spurflex_io_results_layout
       quantity_type('bearing2_deformation_max', 'm', real_value, .false., '', 'largest deformation of the driven bearing'), &
       quantity_type('eta1', 'percent', real_value, .true., '', 'change of bearing1_deformation_max by the flexible support'), &
       quantity_type('eta2', 'percent', real_value, .true., '', 'change of bearing2_deformation_max by the flexible support'), &
+      quantity_type('eta_error', 'percent', real_value, .true., '', &
+                    'estimated error of eta; large where a motion is not periodic and its maximum depends on the window'), &
       quantity_type('error_estimate', '1', real_value, .false., '', &
                     'estimated relative error of the amplitude and of the bearing deformations'), &
       quantity_type('floquet_magnitude', '1', real_value, .false., 'floquet', &
@@ -242,7 +244,7 @@ contains
       character(len=*), intent(in) :: quantity
       !> Responses, shape (points).
       type(response), intent(in) :: responses(:)
-      !> Changes by the flexible support [percent], shape (2, points).
+      !> Changes by the flexible support and their error [percent], shape (3, points).
       real(wp), intent(in) :: eta(:, :)
       !> Values of a real quantity, shape (points); else left alone.
       real(wp), intent(inout) :: reals(:)
@@ -266,6 +268,8 @@ contains
          reals = eta(1, :)
       case ('eta2')
          reals = eta(2, :)
+      case ('eta_error')
+         reals = eta(3, :)
       case ('error_estimate')
          reals = responses%error_estimate
       case ('floquet_magnitude')

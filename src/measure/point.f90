@@ -1,6 +1,6 @@
 !> The measured response of one operating point: find the steady motion, measure it, and measure how good the numbers are.
 !>
-!> A periodic motion is found a second time by other means, exponential collocation with half the step, and the difference is the
+!> A periodic motion is found a second time by other means, exponential collocation with less than half the step, and the difference is the
 !> error estimate. Where the step is free it is halved until the estimate meets the tolerance. The numbers of a motion that
 !> is not periodic depend on the window: their estimate is what two halves of the window differ by.
 module spurflex_measure_point
@@ -78,7 +78,7 @@ contains
       answer%motion = motion%motion
       answer%periods_integrated = motion%periods_integrated
       if (motion%status == status_diverged) return
-      answer%floquet_magnitude = motion%floquet_magnitude
+      if (motion%periods > 0) answer%floquet_magnitude = motion%floquet_magnitude
       answer%lyapunov_exponent = motion%lyapunov_exponent
       answer%lyapunov_error = motion%lyapunov_error
       if (motion%periods > 0) then
@@ -174,7 +174,8 @@ contains
       integer :: steps
 
       found = .false.
-      steps = 2*solver%map%steps
+      ! One more than twice as many: where the grids nest, a crossing can leave both runs with the same interval behind it.
+      steps = 2*solver%map%steps + 1
       if (solver%options%integrator == integrator_newmark) steps = first_steps(equations)
       call solver%judge%load(equations, steps, error)
       if (allocated(error)) return

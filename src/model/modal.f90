@@ -15,7 +15,7 @@ module spurflex_model_modal
    implicit none
    private
 
-   public :: modal_system, new_modal_system
+   public :: modal_system, new_modal_system, same_modes
 
    !> Share of the largest mode below which the mesh does not drive a mode.
    real(wp), parameter :: undriven = 1.0e-14_wp
@@ -118,5 +118,19 @@ contains
       share = abs(gain*drive/max(abs(values), tiny(1.0_wp)))
       kept = kept .and. share > undriven*maxval(share)
    end subroutine leave_out_undriven
+
+   !> Two points have the same linear part, whatever their speeds.
+   pure function same_modes(a, b) result(same)
+      !> Equations of motion of both.
+      type(equations_type), intent(in) :: a, b
+      !> The modes of one are those of the other.
+      logical :: same
+
+      same = a%n == b%n
+      if (same) same = .not. (any(abs(a%stiffness - b%stiffness) > 0.0_wp) .or. any(abs(a%damping - b%damping) > 0.0_wp) &
+                              .or. any(abs(a%mass - b%mass) > 0.0_wp) .or. any(abs(a%direction - b%direction) > 0.0_wp) &
+                              .or. abs(a%mesh%mean_stiffness - b%mesh%mean_stiffness) > 0.0_wp &
+                              .or. abs(a%mesh%damping - b%mesh%damping) > 0.0_wp)
+   end function same_modes
 
 end module spurflex_model_modal

@@ -9,6 +9,9 @@ module spurflex_steady_lyapunov
 
    public :: lyapunov_sum
 
+   !> Error of an exponent that is not known; far above any exponent.
+   real(wp), parameter :: unknown = 1.0e30_wp
+
    !> Mesh periods of the first blocks.
    integer, parameter :: first_length = 16
 
@@ -73,7 +76,7 @@ contains
       self%length = 2*self%length
    end subroutine add
 
-   !> Exponent and its standard error; the error is infinite before there are two blocks.
+   !> Exponent and its standard error; the error is `unknown` before there are two blocks.
    pure subroutine mean_growth(self, exponent, error, periods, wander)
       !> Sum.
       class(lyapunov_sum), intent(in) :: self
@@ -99,7 +102,7 @@ contains
       end do
       wander = high - low
       exponent = 0.0_wp
-      error = huge(1.0_wp)
+      error = unknown
       periods = self%blocks*self%length
       if (self%blocks < 1) return
       rate = self%growth(:self%blocks)/real(self%length, wp)

@@ -97,8 +97,8 @@ contains
       do
          call look_for_orbit(map, transient, options, visitor, spent, motion, found)
          if (found .or. .not. transient%sound .or. transient%periods >= options%max_periods) exit
-         ! The exponent is that of the latest half: what came before was still on its way.
-         call transient%growth%reset()
+         ! The exponent is that of the latest half or more: what came before was still on its way.
+         if (next_look <= options%max_periods) call transient%growth%reset()
          call advance_transient(map, transient, min(next_look, options%max_periods), visitor)
          if (.not. transient%sound) exit
          next_look = 2*next_look
@@ -164,7 +164,8 @@ contains
       integer :: n
 
       call transient%ring%nearest(n, distance)
-      call find_orbit(map, transient%state, n, max(transient%ring%scale(), abs(map%half_backlash)), visitor, orbit, found)
+      call find_orbit(map, transient%state, n, max(transient%ring%scale(), abs(map%half_backlash)), visitor, orbit, found, &
+                      only_affine=transient%periods == 0)
       spent = spent + orbit%integrated
       if (.not. found) return
       call reduce_period(map, visitor, spent, orbit)
@@ -237,7 +238,7 @@ contains
       away = transient%state - orbit%state
       if (contact_is_kept(map, orbit)) then
          clearance = merge(orbit%smallest - map%half_backlash, -map%half_backlash - orbit%largest, orbit%smallest > 0.0_wp)
-         it_does = sum(map%deflection_weight*abs(away)) <= safe_share*clearance
+         it_does = map%deflection_bound(away) <= safe_share*clearance
          if (it_does .or. .not. map%half_backlash > 0.0_wp) then
             it_does = .true.
             return

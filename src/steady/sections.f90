@@ -114,7 +114,7 @@ contains
       real(wp), intent(in) :: weight(:)
       !> State, shape (size).
       real(wp), intent(in) :: state(:)
-      !> Largest weighted component.
+      !> Euclidean norm of the weighted components.
       real(wp) :: norm
 
       norm = norm2(weight*state)

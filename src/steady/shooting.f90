@@ -72,7 +72,7 @@ contains
    end subroutine advance_periods
 
    !> Find a periodic motion near a state.
-   subroutine find_orbit(map, start, periods, scale, visitor, orbit, found)
+   subroutine find_orbit(map, start, periods, scale, visitor, orbit, found, only_affine)
       !> Period map at an operating point.
       class(period_map), intent(inout) :: map
       !> State near the motion, shape (size).
@@ -87,6 +87,8 @@ contains
       type(periodic_orbit), intent(out) :: orbit
       !> There is one.
       logical, intent(out) :: found
+      !> Give up at once where contact is lost.
+      logical, intent(in), optional :: only_affine
 
       type(error_type), allocatable :: error
       real(wp) :: end_state(size(start)), matrix(size(start), size(start)), step(size(start))
@@ -108,6 +110,9 @@ contains
          call advance_periods(map, periods, end_state, matrix, orbit%smallest, orbit%largest)
          orbit%integrated = orbit%integrated + periods
          was_kept = contact_is_kept(map, orbit)
+         if (present(only_affine)) then
+            if (only_affine .and. .not. was_kept) return
+         end if
          ! Row i of the tangents is what a unit of component i becomes: the monodromy is their transpose.
          orbit%monodromy = transpose(matrix)
          matrix = -orbit%monodromy

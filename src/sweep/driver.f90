@@ -5,7 +5,6 @@ module spurflex_sweep_driver
    use spurflex_base_error, only: error_type, exit_complete, exit_failed_points
    use spurflex_base_kinds, only: wp
    use spurflex_base_text, only: to_text, fixed_text
-   use spurflex_external_posix, only: remove_file
    use spurflex_external_threads, only: use_one_thread
    use spurflex_io_agreement, only: share_error
    use spurflex_io_case, only: case_type
@@ -133,18 +132,12 @@ contains
       call mpi_comm_rank(comm, rank)
       if (rank == 0) then
          inquire (file=case%output%file, exist=exists(1))
-         if (exists(1) .and. fresh) then
-            call remove_file(case%output%file, error)
-            exists(1) = .false.
-         end if
       end if
-      call share_error(comm, error)
-      if (allocated(error)) return
       call mpi_bcast(exists, 1, MPI_LOGICAL, 0, comm)
-      if (exists(1)) then
+      if (exists(1) .and. .not. fresh) then
          call open_results(results, case, comm, error)
       else
-         call create_results(results, case, comm, provenance, error)
+         call create_results(results, case, comm, provenance, fresh, error)
       end if
    end subroutine open_file
 
@@ -158,7 +151,8 @@ contains
       integer, allocatable, intent(out) :: rigid_status(:)
       !> Status of the flexible points, shape (speed, stiffness); empty if they are not asked for.
       integer, allocatable, intent(out) :: status(:, :)
-      !> Largest bearing deformations of the rigid twins, shape (2, speed); unallocated if they are not asked for.
+      !> Largest bearing deformations of the rigid twins and their relative error, shape (3, speed); unallocated if they are
+      !> not asked for.
       real(wp), allocatable, intent(out) :: rigid_deformation(:, :)
       !> Set where the file cannot be read.
       type(error_type), allocatable, intent(out) :: error
@@ -173,10 +167,10 @@ contains
       if (allocated(error) .or. .not. case%sweep%rigid) return
       allocate (rigid(case%sweep%speed_count))
       call read_rigid(results, rigid, error)
-      allocate (rigid_deformation(2, case%sweep%speed_count), source=no_twin)
+      allocate (rigid_deformation(3, case%sweep%speed_count), source=no_twin)
       do i = 1, size(rigid)
          if (rigid(i)%status == status_missing .or. rigid(i)%status == status_diverged) cycle
-         rigid_deformation(:, i) = rigid(i)%bearing_deformation_max
+         rigid_deformation(:, i) = [rigid(i)%bearing_deformation_max, rigid(i)%error_estimate]
       end do
    end subroutine find_missing
 

@@ -37,8 +37,8 @@ contains
       type(results_file), intent(in) :: results
       !> Logger.
       type(logger), intent(in), target :: log
-      !> Largest bearing deformations of the rigid twins, shape (2, speed): filled in where this rank solves rigid points;
-      !> unallocated if they are not asked for.
+      !> Largest bearing deformations of the rigid twins and their relative error, shape (3, speed): filled in where this rank
+      !> solves rigid points; unallocated if they are not asked for.
       real(wp), allocatable, intent(inout) :: rigid_deformation(:, :)
       !> On rank 0: points by status on all ranks, shape (outcomes).
       integer, intent(out) :: total(:)
@@ -128,28 +128,30 @@ contains
       type(response), intent(in) :: responses(:)
       !> Open result file.
       type(results_file), intent(in) :: results
-      !> Rigid twins, shape (2, speed); unallocated if they are not asked for.
+      !> Rigid twins, shape (3, speed); unallocated if they are not asked for.
       real(wp), allocatable, intent(inout) :: rigid_deformation(:, :)
       !> Set where the chunk cannot be written.
       type(error_type), allocatable, intent(out) :: error
 
-      real(wp) :: eta(2, size(responses)), rigid(2)
+      real(wp) :: eta(3, size(responses)), rigid(2), ratio(2)
       integer :: i
 
       eta = nan()
       if (chunk%row == 0) then
          do i = 1, size(responses)
             if (responses(i)%status == status_diverged) cycle
-            rigid_deformation(:, chunk%first + i - 1) = responses(i)%bearing_deformation_max
+            rigid_deformation(:, chunk%first + i - 1) = [responses(i)%bearing_deformation_max, responses(i)%error_estimate]
          end do
          call write_rigid(results, chunk%first, responses, error)
          return
       end if
       if (allocated(rigid_deformation)) then
          do i = 1, size(responses)
-            rigid = rigid_deformation(:, chunk%first + i - 1)
+            rigid = rigid_deformation(:2, chunk%first + i - 1)
             if (any(rigid >= no_twin) .or. any(rigid <= 0.0_wp) .or. responses(i)%status == status_diverged) cycle
-            eta(:, i) = 100.0_wp*(responses(i)%bearing_deformation_max - rigid)/rigid
+            ratio = responses(i)%bearing_deformation_max/rigid
+            eta(:2, i) = 100.0_wp*(ratio - 1.0_wp)
+            eta(3, i) = 100.0_wp*maxval(ratio)*(responses(i)%error_estimate + rigid_deformation(3, chunk%first + i - 1))
          end do
       end if
       call write_flexible(results, chunk%row, chunk%first, responses, eta, error)

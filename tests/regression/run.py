@@ -4,7 +4,10 @@
 A case is a folder with
   deck.nml         what the program runs, in an empty folder;
   tolerances.toml  the quantities compared, the tolerance of each and its reason;
-  reference.json   the values expected; written by --update.
+  reference.json   the values expected; written by --update;
+  reference.nml    if it is there, the deck that --update runs instead: the same points, more accurate;
+  reference.py     if it is there, the program that computes the reference without spurflex
+                   (tests/regression/regenerate runs it).
 
 The program and mpirun are those of SPURFLEX_PROGRAM and SPURFLEX_MPIEXEC; build/spurflex and
 "mpirun -n" where these are not set.
@@ -158,7 +161,10 @@ def main():
             if options.result:
                 code, result = (0 if options.update else None), options.result
             else:
-                code, result = run_program(case / "deck.nml", Path(folder), options.ranks)
+                deck = case / "reference.nml"
+                if not (options.update and deck.is_file()):
+                    deck = case / "deck.nml"
+                code, result = run_program(deck, Path(folder), options.ranks)
             faults = [] if options.update else check(case, code, result)
             if options.update:
                 update(case, code, result)

@@ -59,7 +59,7 @@ program results_driver
    case ('create', 'write', 'die', 'hold', 'time')
       call collect_provenance(provenance, error)
       call give_up_on(error)
-      call create_results(results, case, MPI_COMM_WORLD, provenance, error)
+      call create_results(results, case, MPI_COMM_WORLD, provenance, .false., error)
    case default
       call open_results(results, case, MPI_COMM_WORLD, error)
    end select
@@ -161,7 +161,7 @@ contains
             else if (all(flexible_status(first:last, stiffness) /= status_missing)) then
                cycle
             else if (case%sweep%rigid) then
-               eta = reshape([(real([i, stiffness], wp), i=first, last)], [2, last - first + 1])
+               eta = reshape([(real([i, stiffness, 0], wp), i=first, last)], [3, last - first + 1])
                call write_flexible(results, stiffness, first, responses, eta, error)
             else
                call write_flexible(results, stiffness, first, responses, error=error)

@@ -26,7 +26,7 @@ REALS = {
 }
 FLAGS = ("motion", "status", "contact")
 COMMON = {*REALS, *FLAGS, "periods_integrated"}
-ETA = {"eta1", "eta2"}
+ETA = {"eta1", "eta2", "eta_error"}
 RIGID = {f"rigid_{name}" for name in COMMON}
 PROVENANCE = {
     "resolved_deck",

@@ -3,11 +3,21 @@
 program unit_tests
    use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
    use mpi_f08, only: MPI_Allreduce, MPI_COMM_WORLD, MPI_Finalize, MPI_Init, MPI_INTEGER, MPI_SUM
+   use test_collocation, only: collect_collocation
    use test_contact, only: collect_contact
+   use test_deck, only: collect_deck
    use test_equations, only: collect_equations
    use test_mesh, only: collect_mesh
+   use test_motion, only: collect_motion
+   use test_newmark, only: collect_newmark
    use test_paper_model, only: collect_paper_model
+   use test_plan, only: collect_plan
    use test_results, only: collect_results
+   use test_steady, only: collect_steady
+   use test_modal, only: collect_modal
+   use test_exponential, only: collect_exponential
+   use test_crossings, only: collect_crossings
+   use test_shooting, only: collect_shooting
    use test_support, only: new_testsuite, run_testsuite, select_suite, testsuite_type
    use test_text, only: collect_text
    implicit none
@@ -20,10 +30,20 @@ program unit_tests
    suites = [ &
             new_testsuite('text', collect_text), &
             new_testsuite('results', collect_results), &
+            new_testsuite('deck', collect_deck), &
             new_testsuite('paper_model', collect_paper_model), &
             new_testsuite('mesh', collect_mesh), &
             new_testsuite('equations', collect_equations), &
-            new_testsuite('contact', collect_contact) &
+            new_testsuite('contact', collect_contact), &
+            new_testsuite('newmark', collect_newmark), &
+            new_testsuite('collocation', collect_collocation), &
+            new_testsuite('motion', collect_motion), &
+            new_testsuite('plan', collect_plan), &
+            new_testsuite('steady', collect_steady), &
+            new_testsuite('modal', collect_modal), &
+            new_testsuite('exponential', collect_exponential), &
+            new_testsuite('crossings', collect_crossings), &
+            new_testsuite('shooting', collect_shooting) &
             ]
 
    call MPI_Init()

@@ -162,7 +162,7 @@ contains
          //'rigid_periods_integrated rigid_contact rigid_status '
 
       call check(error, names_of(flexible_variables(grid_of(rigid=.true., flexible=.true.))), &
-         before_eta//'eta1 eta2 '//behind_eta)
+         before_eta//'eta1 eta2 eta_error '//behind_eta)
       if (allocated(error)) return
       call check(error, names_of(flexible_variables(grid_of(rigid=.false., flexible=.true.))), before_eta//behind_eta)
       if (allocated(error)) return
@@ -191,7 +191,7 @@ contains
 
       type(variable_type), allocatable :: variables(:)
       type(response) :: responses(1)
-      real(wp), parameter :: eta(2, 1) = 0.0_wp, unset = -1.0_wp
+      real(wp), parameter :: eta(3, 1) = 0.0_wp, unset = -1.0_wp
       real(wp) :: reals(1)
       integer :: integers(1), i
 
