@@ -135,7 +135,7 @@ def test_units_and_flags(drive, tmp_path):
                 assert len(attributes["flag_values"]) == len(attributes["flag_meanings"].split())
         for name in ETA:
             assert data[name].attrs["units"] == "percent"
-        assert list(data.motion.attrs["flag_values"]) == [*range(9), 20, 30]
+        assert list(data.motion.attrs["flag_values"]) == [*range(9), *range(109, 165), 20, 30]
 
 
 def test_new_file_is_empty(drive, tmp_path):

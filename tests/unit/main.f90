@@ -18,6 +18,8 @@ program unit_tests
    use test_exponential, only: collect_exponential
    use test_crossings, only: collect_crossings
    use test_shooting, only: collect_shooting
+   use test_search, only: collect_search
+   use test_kahraman_singh, only: collect_kahraman_singh
    use test_support, only: new_testsuite, run_testsuite, select_suite, testsuite_type
    use test_text, only: collect_text
    implicit none
@@ -43,7 +45,9 @@ program unit_tests
             new_testsuite('modal', collect_modal), &
             new_testsuite('exponential', collect_exponential), &
             new_testsuite('crossings', collect_crossings), &
-            new_testsuite('shooting', collect_shooting) &
+            new_testsuite('shooting', collect_shooting), &
+            new_testsuite('search', collect_search), &
+            new_testsuite('kahraman_singh', collect_kahraman_singh) &
             ]
 
    call MPI_Init()

@@ -152,7 +152,7 @@ contains
 
       complex(wp) :: q(equations%n), v(equations%n), term(equations%n, 3)
       !> Units of round-off.
-      real(wp), parameter :: operations = 1.0e4_wp
+      real(wp), parameter :: operations = 1.0e5_wp
       real(wp) :: scale, tolerance
       integer :: j, n
 
