@@ -77,7 +77,7 @@ contains
       self%half_backlash = equations%mesh%half_backlash
       self%period = 2.0_wp*pi/equations%frequency
       h = self%period/real(steps, wp)
-      call set_step(self%modal, h, self%whole)
+      call set_step(self%modal, h, self%whole, inner=.true.)
       if (steps /= self%steps .or. .not. allocated(self%table)) then
          if (allocated(self%table)) deallocate (self%table)
          allocate (self%table(steps))
@@ -93,9 +93,9 @@ contains
       !> Map.
       class(collocation_map), intent(inout) :: self
       !> State at the section, shape (size).
-      real(wp), intent(inout) :: state(:)
+      real(wp), intent(inout), contiguous :: state(:)
       !> Tangents that see the same contact, one in a row, shape (tangents, size).
-      real(wp), intent(inout), optional :: tangents(:, :)
+      real(wp), intent(inout), optional, contiguous :: tangents(:, :)
       !> If present, the period is recorded.
       type(orbit_type), intent(inout), optional :: orbit
 
@@ -127,7 +127,7 @@ contains
                branch = next
                start = start + self%part%length
                if (start >= h*(1.0_wp - epsilon(1.0_wp))) exit
-               call set_step(self%modal, h - start, self%part)
+               call set_step(self%modal, h - start, self%part, inner=present(orbit))
                call set_mesh_points(self%equations, h*real(s - 1, wp) + start, h - start, mesh)
                call solve_step(self%part, mesh, branch, state, alpha, force, shift)
             end do
@@ -159,7 +159,7 @@ contains
          whole_length = merge(h, h - start, start <= 0.0_wp)
          cut = cut*whole_length
          do tries = 1, most_tries
-            call set_step(self%modal, cut, self%part)
+            call set_step(self%modal, cut, self%part, inner=present(orbit))
             call set_mesh_points(self%equations, h*real(s - 1, wp) + start, cut, mesh)
             call solve_step(self%part, mesh, branch, state, alpha, force, shift)
             call refine_crossing(branch, next, mesh%deflection + shift, self%half_backlash, whole_length, cut, miss)

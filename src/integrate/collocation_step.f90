@@ -2,7 +2,7 @@
 !> points of the step, then linear maps of the state and of tangents.
 module spurflex_integrate_collocation_step
    use spurflex_base_kinds, only: wp
-   use spurflex_integrate_exponential, only: step_coefficients, nodes
+   use spurflex_integrate_exponential, only: step_coefficients, nodes, width
    use spurflex_integrate_mesh_table, only: mesh_points, branch_law
    implicit none
    private
@@ -99,9 +99,8 @@ contains
       !> Tangents, one in a row, shape (tangents, size).
       real(wp), intent(inout), contiguous :: tangents(:, :)
 
-      real(wp) :: matrix(2:nodes, 2:2*nodes), force(size(tangents, 1), nodes), free(size(tangents, 1), 2:nodes)
-      real(wp), dimension(size(tangents, 1)) :: re, im
-      integer :: i, j, k, m
+      real(wp) :: matrix(2:nodes, 2:2*nodes), some(width, size(tangents, 2))
+      integer :: i, j, k, first, m, n
 
       m = size(tangents, 2)/2
       matrix = 0.0_wp
@@ -113,31 +112,71 @@ contains
          matrix(i, nodes + i - 1) = alpha(i)
       end do
       call eliminate(matrix(:, :2*nodes - 1))
-      force = 0.0_wp
-      do k = 1, m
-         force(:, 1) = force(:, 1) + alpha(1)*tangents(:, k)
-      end do
-      do i = 2, nodes
-         free(:, i) = -step%taken(i, 1)*force(:, 1)
-         do k = 1, m
-            free(:, i) = free(:, i) + step%carry_re(k, i)*tangents(:, k) - step%carry_im(k, i)*tangents(:, m + k)
+      do first = 1, size(tangents, 1), width
+         n = min(width, size(tangents, 1) - first + 1)
+         do k = 1, 2*m
+            some(:n, k) = tangents(first:first + n - 1, k)
+            some(n + 1:, k) = 0.0_wp
          end do
-      end do
-      do i = 2, nodes
-         do j = 2, nodes
-            force(:, i) = force(:, i) + matrix(i, nodes + j - 1)*free(:, j)
-         end do
-      end do
-      do k = 1, m
-         re = tangents(:, k)
-         im = tangents(:, m + k)
-         tangents(:, k) = step%carry_re(k, nodes)*re - step%carry_im(k, nodes)*im
-         tangents(:, m + k) = step%carry_re(k, nodes)*im + step%carry_im(k, nodes)*re
-         do j = 1, nodes
-            tangents(:, k) = tangents(:, k) - step%taken_re(k, j, nodes)*force(:, j)
-            tangents(:, m + k) = tangents(:, m + k) - step%taken_im(k, j, nodes)*force(:, j)
+         call carry_some(m, step%carry_re, step%carry_im, step%taken, step%taken_re(:, :, nodes), step%taken_im(:, :, nodes), &
+                         alpha(1), matrix(:, nodes + 1:2*nodes - 1), some)
+         do k = 1, 2*m
+            tangents(first:first + n - 1, k) = some(:n, k)
          end do
       end do
    end subroutine carry_tangents
+
+   !> Carry a vector register of tangents.
+   pure subroutine carry_some(m, carry_re, carry_im, taken, taken_re, taken_im, alpha, law, tangents)
+      !> Modes.
+      integer, intent(in) :: m
+      !> exp(lambda c_i h).
+      real(wp), intent(in) :: carry_re(m, nodes), carry_im(m, nodes)
+      !> What N takes from x at each point, and from the modes at the end.
+      real(wp), intent(in) :: taken(nodes, nodes), taken_re(m, nodes), taken_im(m, nodes)
+      !> Derivative of N by x at the start, and of N at the other points by what x would be there without N.
+      real(wp), intent(in) :: alpha, law(2:nodes, 2:nodes)
+      !> Tangents.
+      real(wp), intent(inout) :: tangents(width, 2*m)
+
+      real(wp) :: force(width, nodes), free(width, 2:nodes), re, im
+      integer :: i, k, r
+
+      force = 0.0_wp
+      free = 0.0_wp
+      do k = 1, m
+         do r = 1, width
+            force(r, 1) = force(r, 1) + tangents(r, k)
+            free(r, 2) = free(r, 2) + carry_re(k, 2)*tangents(r, k) - carry_im(k, 2)*tangents(r, m + k)
+            free(r, 3) = free(r, 3) + carry_re(k, 3)*tangents(r, k) - carry_im(k, 3)*tangents(r, m + k)
+            free(r, 4) = free(r, 4) + carry_re(k, 4)*tangents(r, k) - carry_im(k, 4)*tangents(r, m + k)
+            free(r, 5) = free(r, 5) + carry_re(k, 5)*tangents(r, k) - carry_im(k, 5)*tangents(r, m + k)
+         end do
+      end do
+      do r = 1, width
+         force(r, 1) = alpha*force(r, 1)
+         free(r, 2) = free(r, 2) - taken(2, 1)*force(r, 1)
+         free(r, 3) = free(r, 3) - taken(3, 1)*force(r, 1)
+         free(r, 4) = free(r, 4) - taken(4, 1)*force(r, 1)
+         free(r, 5) = free(r, 5) - taken(5, 1)*force(r, 1)
+      end do
+      do i = 2, nodes
+         do r = 1, width
+            force(r, i) = law(i, 2)*free(r, 2) + law(i, 3)*free(r, 3) + law(i, 4)*free(r, 4) + law(i, 5)*free(r, 5)
+         end do
+      end do
+      do k = 1, m
+         do r = 1, width
+            re = tangents(r, k)
+            im = tangents(r, m + k)
+            tangents(r, k) = carry_re(k, nodes)*re - carry_im(k, nodes)*im &
+                             - (taken_re(k, 1)*force(r, 1) + taken_re(k, 2)*force(r, 2) + taken_re(k, 3)*force(r, 3) &
+                                + taken_re(k, 4)*force(r, 4) + taken_re(k, 5)*force(r, 5))
+            tangents(r, m + k) = carry_re(k, nodes)*im + carry_im(k, nodes)*re &
+                                 - (taken_im(k, 1)*force(r, 1) + taken_im(k, 2)*force(r, 2) + taken_im(k, 3)*force(r, 3) &
+                                    + taken_im(k, 4)*force(r, 4) + taken_im(k, 5)*force(r, 5))
+         end do
+      end do
+   end subroutine carry_some
 
 end module spurflex_integrate_collocation_step

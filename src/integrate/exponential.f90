@@ -14,12 +14,12 @@ module spurflex_integrate_exponential
    implicit none
    private
 
-   public :: step_coefficients, set_step, node, nodes, lagrange
+   public :: step_coefficients, set_step, node, nodes, lagrange, width
 
    !> Points of a step.
    integer, parameter :: nodes = 5
 
-   !> Modes that are taken together: one AVX-512 register or two AVX2 registers of doubles.
+   !> Modes, or tangents, that are taken together: one AVX-512 register or two AVX2 registers of doubles.
    integer, parameter :: width = 8
 
    !> Outer inner Lobatto point, (1 - sqrt(3/7))/2.
@@ -73,20 +73,27 @@ module spurflex_integrate_exponential
 contains
 
    !> Compute the coefficients of a step.
-   pure subroutine set_step(modal, length, step)
+   pure subroutine set_step(modal, length, step, inner)
       !> The modes.
       type(modal_system), intent(in) :: modal
       !> Length of the step [s].
       real(wp), intent(in) :: length
       !> The coefficients.
       type(step_coefficients), intent(inout) :: step
+      !> The modes will be wanted at the inner points too, not only at the end; they will if absent.
+      logical, intent(in), optional :: inner
 
       real(wp), dimension(width) :: y_re, y_im, b_re, b_im, c_re, c_im
+      real(wp), dimension(width, 0:last) :: moment_re, moment_im
       real(wp), dimension(width, nodes) :: t_re, t_im
       integer :: i, j, k, first, last_mode, n
+      logical :: all_points
 
+      all_points = .true.
+      if (present(inner)) all_points = inner
       if (.not. allocated(step%carry_re)) call allocate_step(modal, step)
       step%length = length
+      step%taken = 0.0_wp
       do first = 1, modal%modes, width
          last_mode = min(first + width - 1, modal%modes)
          n = last_mode - first + 1
@@ -101,18 +108,17 @@ contains
             b_im(k) = length*aimag(modal%influence(first + k - 1))
          end do
          do i = 2, nodes
-            call set_point(i, y_re, y_im, b_re, b_im, c_re, c_im, t_re, t_im)
+            call set_point(i, y_re, y_im, b_re, b_im, c_re, c_im, moment_re, moment_im)
             step%carry_re(first:last_mode, i) = c_re(:n)
             step%carry_im(first:last_mode, i) = c_im(:n)
+            call add_deflection(moment_re, step%taken(i, :))
+            if (i < nodes .and. .not. all_points) cycle
+            call take_polynomials(moment_re, t_re)
+            call take_polynomials(moment_im, t_im)
             do j = 1, nodes
                step%taken_re(first:last_mode, j, i) = t_re(:n, j)
                step%taken_im(first:last_mode, j, i) = t_im(:n, j)
             end do
-         end do
-      end do
-      do i = 2, nodes
-         do j = 1, nodes
-            step%taken(i, j) = sum(step%taken_re(:, j, i))
          end do
       end do
    end subroutine set_step
@@ -129,8 +135,44 @@ contains
       allocate (step%taken_re(modal%modes, nodes, nodes), step%taken_im(modal%modes, nodes, nodes), source=0.0_wp)
    end subroutine allocate_step
 
-   !> Coefficients of one point of the step, a vector of modes at a time.
-   pure subroutine set_point(i, x_re, x_im, b_re, b_im, carry_re, carry_im, taken_re, taken_im)
+   !> What the moments take from the mesh deflection, for each value of N.
+   pure subroutine add_deflection(moment, taken)
+      !> Real parts of the moments.
+      real(wp), intent(in) :: moment(width, 0:last)
+      !> Sum over the modes so far, shape (nodes).
+      real(wp), intent(inout) :: taken(nodes)
+
+      real(wp) :: total(0:last)
+      integer :: j, m
+
+      do m = 0, last
+         total(m) = ((moment(1, m) + moment(2, m)) + (moment(3, m) + moment(4, m))) &
+                    + ((moment(5, m) + moment(6, m)) + (moment(7, m) + moment(8, m)))
+      end do
+      do j = 1, nodes
+         taken(j) = taken(j) + sum(lagrange(:, j)*total)
+      end do
+   end subroutine add_deflection
+
+   !> From moments of powers to moments of the Lagrange polynomials.
+   pure subroutine take_polynomials(moment, taken)
+      !> Moments of the powers.
+      real(wp), intent(in) :: moment(width, 0:last)
+      !> Moments of the polynomials.
+      real(wp), intent(out) :: taken(width, nodes)
+
+      integer :: j, k
+
+      do j = 1, nodes
+         do k = 1, width
+            taken(k, j) = lagrange(0, j)*moment(k, 0) + lagrange(1, j)*moment(k, 1) + lagrange(2, j)*moment(k, 2) &
+                          + lagrange(3, j)*moment(k, 3) + lagrange(4, j)*moment(k, 4)
+         end do
+      end do
+   end subroutine take_polynomials
+
+   !> Moments of the powers at one point of the step, a vector of modes at a time.
+   pure subroutine set_point(i, x_re, x_im, b_re, b_im, carry_re, carry_im, re, im)
       !> The point.
       integer, intent(in) :: i
       !> lambda h.
@@ -139,13 +181,12 @@ contains
       real(wp), intent(in) :: b_re(width), b_im(width)
       !> exp(c_i lambda h).
       real(wp), intent(out) :: carry_re(width), carry_im(width)
-      !> What each value of N takes.
-      real(wp), intent(out) :: taken_re(width, nodes), taken_im(width, nodes)
+      !> Moments of the powers, times h b.
+      real(wp), intent(out) :: re(width, 0:last), im(width, 0:last)
 
       real(wp), dimension(width) :: y_re, y_im, power_re, power_im
-      real(wp), dimension(width, 0:last) :: re, im
       real(wp) :: product
-      integer :: j, k, m
+      integer :: k, m
 
       do k = 1, width
          y_re(k) = node(i)*x_re(k)
@@ -172,14 +213,6 @@ contains
             product = power_re(k)*re(k, m) - power_im(k)*im(k, m)
             im(k, m) = power_re(k)*im(k, m) + power_im(k)*re(k, m)
             re(k, m) = product
-         end do
-      end do
-      do j = 1, nodes
-         do k = 1, width
-            taken_re(k, j) = lagrange(0, j)*re(k, 0) + lagrange(1, j)*re(k, 1) + lagrange(2, j)*re(k, 2) &
-                             + lagrange(3, j)*re(k, 3) + lagrange(4, j)*re(k, 4)
-            taken_im(k, j) = lagrange(0, j)*im(k, 0) + lagrange(1, j)*im(k, 1) + lagrange(2, j)*im(k, 2) &
-                             + lagrange(3, j)*im(k, 3) + lagrange(4, j)*im(k, 4)
          end do
       end do
    end subroutine set_point

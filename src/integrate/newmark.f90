@@ -176,9 +176,9 @@ contains
       !> Map.
       class(newmark_map), intent(inout) :: self
       !> State at the section, shape (size).
-      real(wp), intent(inout) :: state(:)
+      real(wp), intent(inout), contiguous :: state(:)
       !> Tangents that see the same contact, one in a row, shape (tangents, size).
-      real(wp), intent(inout), optional :: tangents(:, :)
+      real(wp), intent(inout), optional, contiguous :: tangents(:, :)
       !> If present, the period is recorded.
       type(orbit_type), intent(inout), optional :: orbit
 

@@ -74,9 +74,9 @@ module spurflex_integrate_period_map
          !> Map.
          class(period_map), intent(inout) :: self
          !> State at the section, shape (size).
-         real(wp), intent(inout) :: state(:)
+         real(wp), intent(inout), contiguous :: state(:)
          !> Tangents that see the same contact, one in a row, shape (tangents, size).
-         real(wp), intent(inout), optional :: tangents(:, :)
+         real(wp), intent(inout), optional, contiguous :: tangents(:, :)
          !> If present, the period is recorded.
          type(orbit_type), intent(inout), optional :: orbit
       end subroutine advance_interface

@@ -1,7 +1,7 @@
 !> The measured response of one operating point: find the steady motion, measure it, and measure how good the numbers are.
 !>
-!> A periodic motion is found a second time by other means, exponential collocation with less than half the step, and the difference is the
-!> error estimate. Where the step is free it is halved until the estimate meets the tolerance. The numbers of a motion that
+!> A periodic motion is found a second time by other means, exponential collocation with less than half the step, and the
+!> difference is the error estimate. Where the step is free it is halved until the estimate meets the tolerance. The numbers of a motion that
 !> is not periodic depend on the window: their estimate is what two halves of the window differ by.
 module spurflex_measure_point
    use spurflex_base_attendant, only: attendant

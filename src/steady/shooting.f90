@@ -51,9 +51,9 @@ contains
       !> Mesh periods.
       integer, intent(in) :: periods
       !> State at the section, shape (size).
-      real(wp), intent(inout) :: state(:)
+      real(wp), intent(inout), contiguous :: state(:)
       !> Tangents, one in a row, shape (tangents, size).
-      real(wp), intent(inout), optional :: tangents(:, :)
+      real(wp), intent(inout), optional, contiguous :: tangents(:, :)
       !> Extremes of the mesh deflection [m].
       real(wp), intent(out), optional :: smallest, largest
 
