@@ -2,9 +2,10 @@
 module spurflex_sweep_driver
    use mpi_f08, only: MPI_Comm, MPI_IN_PLACE, MPI_DOUBLE_PRECISION, MPI_MIN, MPI_INTEGER, MPI_CHARACTER, MPI_LOGICAL, &
       mpi_allreduce, mpi_bcast, mpi_comm_rank, mpi_comm_size
-   use spurflex_base_error, only: error_type, exit_complete, exit_failed_points
+   use spurflex_base_error, only: error_type, exit_complete, exit_failed_points, exit_stopped
    use spurflex_base_kinds, only: wp
    use spurflex_base_text, only: to_text, fixed_text
+   use spurflex_external_signals, only: watch_for_drain
    use spurflex_external_threads, only: use_one_thread
    use spurflex_io_agreement, only: share_error
    use spurflex_io_case, only: case_type
@@ -14,7 +15,7 @@ module spurflex_sweep_driver
    use spurflex_io_results, only: results_file, create_results, open_results, close_results, read_status, read_rigid
    use spurflex_measure_response, only: response, status_missing, status_diverged
    use spurflex_sweep_attendance, only: outcome_text
-   use spurflex_sweep_plan, only: plan_row, plan_grid, describe_plan
+   use spurflex_sweep_plan, only: chunk_type, plan_row, plan_grid, describe_plan
    use spurflex_sweep_schedule, only: outcomes
    use spurflex_sweep_worker, only: work_on_chunks, no_twin
    implicit none
@@ -68,10 +69,11 @@ contains
       type(results_file), target :: results
       integer, allocatable :: rigid_status(:), status(:, :)
       real(wp), allocatable :: rigid_deformation(:, :)
-      integer :: ranks, total(outcomes), finished(outcomes)
+      integer :: ranks, total(outcomes), left
 
       code = exit_complete
       call use_one_thread()
+      call watch_for_drain()
       call mpi_comm_size(comm, ranks)
       call log%say(describe_plan(case))
       call open_file(results, case, comm, fresh, error)
@@ -82,31 +84,48 @@ contains
       if (allocated(error)) return
 
       total = 0
+      left = 0
       if (any(rigid_status == status_missing)) then
-         call log%begin('rigid support: '//to_text(count(rigid_status == status_missing))//' points on ' &
-                        //to_text(ranks)//' ranks')
-         call work_on_chunks(case, plan_row(case, rigid_status, ranks), comm, results, log, rigid_deformation, finished, error)
-         if (allocated(error)) error%alone = .true.
+         call work_through(plan_row(case, rigid_status, ranks), 'rigid support')
          if (allocated(error)) return
-         total = total + finished
          call mpi_allreduce(MPI_IN_PLACE, rigid_deformation, size(rigid_deformation), MPI_DOUBLE_PRECISION, MPI_MIN, comm)
       end if
-      if (any(status == status_missing)) then
-         call log%begin('flexible support: '//to_text(count(status == status_missing))//' points on ' &
-                        //to_text(ranks)//' ranks')
-         call work_on_chunks(case, plan_grid(case, status, ranks), comm, results, log, rigid_deformation, finished, error)
-         if (allocated(error)) error%alone = .true.
+      if (any(status == status_missing) .and. left == 0) then
+         call work_through(plan_grid(case, status, ranks), 'flexible support')
          if (allocated(error)) return
-         total = total + finished
       end if
-      if (sum(total) == 0) call log%say('nothing to do: every point of '//case%output%file//' is there')
+      if (left == 0 .and. sum(total) == 0) call log%say('nothing to do: every point of '//case%output%file//' is there')
       total(status_diverged) = total(status_diverged) + count(rigid_status == status_diverged) &
                                + count(status == status_diverged)
-      call mpi_bcast(total, outcomes, MPI_INTEGER, 0, comm)
       if (total(status_diverged) > 0) code = exit_failed_points
+      if (left > 0) code = exit_stopped
       call close_results(results, error)
       if (allocated(error)) return
       call log%say('done in '//fixed_text(log%elapsed(), 2)//' s: '//outcome_text(total)//'; results in '//case%output%file)
+      if (left > 0) call log%say('stopped early as asked; run the same command again to go on')
+
+   contains
+
+      !> Work through the chunks of one support; counts up `total`, and `left` on every rank.
+      subroutine work_through(chunks, support)
+         !> The chunks, the same on every rank.
+         type(chunk_type), intent(in) :: chunks(:)
+         !> Name of the support.
+         character(len=*), intent(in) :: support
+
+         integer :: finished(outcomes)
+
+         call log%begin(support//': '//to_text(sum(chunks%count))//' points on '//to_text(ranks)//' ranks')
+         call work_on_chunks(case, chunks, comm, results, log, rigid_deformation, finished, error)
+         if (allocated(error)) then
+            error%alone = .true.
+            return
+         end if
+         call mpi_bcast(finished, outcomes, MPI_INTEGER, 0, comm)
+         total = total + finished
+         left = left + sum(chunks%count) - sum(finished)
+      end subroutine work_through
+
    end subroutine run_case
 
    !> Open the result file: continue an existing one of the same case, else make a new one.

@@ -6,6 +6,7 @@ module spurflex_sweep_schedule
    use mpi_f08, only: MPI_Comm, MPI_Request, MPI_Status, MPI_COMM_NULL, MPI_REQUEST_NULL, MPI_INTEGER, MPI_ANY_SOURCE, &
       MPI_ANY_TAG, MPI_STATUS_IGNORE, mpi_comm_rank, mpi_comm_size, mpi_iprobe, mpi_probe, mpi_irecv, mpi_recv, mpi_send, &
       mpi_wait
+   use spurflex_external_signals, only: drain_is_asked_for
    implicit none
    private
 
@@ -153,15 +154,15 @@ contains
       end if
    end subroutine answer_one
 
-   !> Rank 0: the next chunk of the list.
-   pure subroutine hand_out(self, chunk)
+   !> Rank 0: the next chunk of the list; none once a drain has been asked for.
+   subroutine hand_out(self, chunk)
       !> Scheduler.
       class(scheduler), intent(inout) :: self
       !> The chunk, or `no_chunk`.
       integer, intent(out) :: chunk
 
       chunk = no_chunk
-      if (self%handed_out == self%chunks) return
+      if (self%handed_out == self%chunks .or. drain_is_asked_for()) return
       self%handed_out = self%handed_out + 1
       chunk = self%handed_out
    end subroutine hand_out
