@@ -10,7 +10,7 @@ module spurflex_external_signals
    integer(c_int), parameter :: sigusr1 = 10_c_int
 
    !> Set by the handler, which may do nothing else: the one state of the process that is not passed as an argument.
-   logical, volatile, save :: asked = .false.
+   logical, volatile :: asked = .false.
 
    interface
       !> Set what happens at a signal.

@@ -71,7 +71,7 @@ contains
       !> The place, as a share of the step.
       real(wp), intent(out) :: place
 
-      real(wp) :: c(0:nodes - 1), low, high, value(0:parts + 1), vertex, curvature, smallest
+      real(wp) :: c(0:nodes - 1), low, high, value(-1:parts + 1), vertex, curvature, smallest
       integer :: k
 
       place = 1.0_wp
@@ -79,13 +79,11 @@ contains
       ! The polynomial undershoots its points by less than they spread.
       if (smallest > maxval(clearance) - smallest) return
       c = matmul(lagrange, clearance)
-      do k = 0, parts
+      do k = -1, parts + 1
          value(k) = polynomial(c, real(k, wp)/real(parts, wp))
       end do
-      ! Behind the end the polynomial belongs to the next step: no dip is looked for there.
-      value(parts + 1) = value(parts) - abs(value(parts)) - 1.0_wp
-      do k = 1, parts
-         if (value(k) < 0.0_wp) then
+      do k = 0, parts
+         if (k > 0 .and. value(k) < 0.0_wp) then
             high = real(k, wp)/real(parts, wp)
             exit
          end if
@@ -93,14 +91,14 @@ contains
          curvature = value(k - 1) - 2.0_wp*value(k) + value(k + 1)
          if (value(k) <= value(k - 1) .and. value(k) <= value(k + 1) .and. curvature > 0.0_wp) then
             vertex = (real(k, wp) + 0.5_wp*(value(k - 1) - value(k + 1))/curvature)/real(parts, wp)
-            if (polynomial(c, vertex) < 0.0_wp) then
+            if (vertex > 0.0_wp .and. vertex < 1.0_wp .and. polynomial(c, vertex) < 0.0_wp) then
                high = vertex
                exit
             end if
          end if
          if (k == parts) return
       end do
-      low = real(k - 1, wp)/real(parts, wp)
+      low = real(max(k - 1, 0), wp)/real(parts, wp)
       place = zero_between(c, low, high)
    end subroutine first_zero
 

@@ -62,8 +62,10 @@ contains
       integer :: s, k
 
       if (.not. same_modes(self%equations, equations)) then
+         self%equations%n = 0
          call new_modal_system(equations, self%modal, error)
          if (allocated(error)) return
+         self%roundoff = self%modal%roundoff
          self%whole = step_coefficients()
          self%part = step_coefficients()
          self%size = 2*self%modal%modes

@@ -64,6 +64,7 @@ contains
 
       n = equations%n
       if (.not. same_modes(self%equations, equations)) then
+         self%equations%n = 0
          call new_modal_system(equations, self%modal, error)
          if (allocated(error)) return
       end if

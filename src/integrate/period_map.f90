@@ -34,6 +34,8 @@ module spurflex_integrate_period_map
       integer :: steps = 0
       !> Mesh period [s].
       real(wp) :: period = 1.0_wp
+      !> Relative error that round-off may leave in a motion [-].
+      real(wp) :: roundoff = 0.0_wp
       !> Half of the backlash [m].
       real(wp) :: half_backlash = 0.0_wp
       !> Smallest and largest mesh deflection over the period last advanced [m].

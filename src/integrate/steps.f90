@@ -41,7 +41,7 @@ contains
       integer :: i, harmonics
       logical :: is_newmark
 
-      ! Free vibration of the mesh, with every body on its own: an upper bound of its frequency is enough here.
+      ! Free vibration of the mesh with every body on its own: near enough to begin with.
       inverse_mass = 0.0_wp
       do i = 1, equations%n
          inverse_mass = inverse_mass + equations%direction(i)**2/equations%mass(i, i)

@@ -90,7 +90,7 @@ module spurflex_io_results_layout
       quantity_type('eta1', 'percent', real_value, .true., '', 'change of bearing1_deformation_max by the flexible support'), &
       quantity_type('eta2', 'percent', real_value, .true., '', 'change of bearing2_deformation_max by the flexible support'), &
       quantity_type('eta_error', 'percent', real_value, .true., '', &
-                    'estimated error of eta; large where a motion is not periodic and its maximum depends on the window'), &
+                    'estimated error of eta; large where its maxima depend on the window'), &
       quantity_type('error_estimate', '1', real_value, .false., '', &
                     'estimated relative error of the amplitude and of the bearing deformations'), &
       quantity_type('floquet_magnitude', '1', real_value, .false., 'floquet', &

@@ -1,8 +1,8 @@
 !> The measured response of one operating point: find the steady motion, measure it, and measure how good the numbers are.
 !>
 !> A periodic motion is found a second time by other means, exponential collocation with less than half the step, and the
-!> difference is the error estimate. Where the step is free it is halved until the estimate meets the tolerance. The numbers of a motion that
-!> is not periodic depend on the window: their estimate is what two halves of the window differ by.
+!> difference is the error estimate. Where the step is free it is halved until the estimate meets the tolerance. The numbers
+!> of a motion that is not periodic depend on the window: their estimate is what its halves, or two integrators, differ by.
 module spurflex_measure_point
    use spurflex_base_attendant, only: attendant
    use spurflex_base_error, only: error_type
@@ -13,17 +13,21 @@ module spurflex_measure_point
    use spurflex_integrate_period_map, only: period_map, orbit_type
    use spurflex_integrate_steps, only: first_steps, better_steps, most_steps
    use spurflex_measure_motion, only: motion_measure
-   use spurflex_measure_response, only: response, empty_response, status_settled, status_inaccurate, status_diverged, &
+   use spurflex_measure_response, only: response, empty_response, status_inaccurate, status_diverged, &
       contact_kept, contact_lost, contact_both_flanks
    use spurflex_model_equations, only: equations_type
    use spurflex_steady_outcome, only: steady_motion
    use spurflex_steady_search, only: find_steady_motion
    use spurflex_steady_sections, only: weighted_norm
-   use spurflex_steady_shooting, only: periodic_orbit, find_orbit
+   use spurflex_steady_shooting, only: periodic_orbit
+   use spurflex_steady_stability, only: find_stable_orbit
    implicit none
    private
 
    public :: point_solver, new_point_solver, respond
+
+   !> Relative difference of displacements that is round-off.
+   real(wp), parameter :: roundoff = 1.0e-14_wp
 
    !> What solves points one after the other; keeps what the next point can use again.
    type :: point_solver
@@ -65,94 +69,86 @@ contains
 
       type(steady_motion) :: motion
       type(error_type), allocatable :: error
+      real(wp), allocatable :: start_position(:), start_velocity(:)
       integer :: steps
+      logical :: known, agreed, accurate
 
       answer = empty_response()
       answer%status = status_diverged
+      start_position = position
+      start_velocity = velocity
       steps = solver%options%steps_per_period
       if (steps == 0) steps = first_steps(equations, solver%options)
-      call solver%map%load(equations, steps, error)
-      if (allocated(error)) return
-      call find_steady_motion(solver%map, solver%map%to_state(position, velocity), solver%options, visitor, motion)
-      answer%status = motion%status
-      answer%motion = motion%motion
-      answer%periods_integrated = motion%periods_integrated
-      if (motion%status == status_diverged) return
-      if (motion%periods > 0) answer%floquet_magnitude = motion%floquet_magnitude
-      answer%lyapunov_exponent = motion%lyapunov_exponent
-      answer%lyapunov_error = motion%lyapunov_error
-      if (motion%periods > 0) then
-         call measure_periodic(solver, equations, visitor, motion, answer)
-      else
-         call measure_window(solver, equations, visitor, motion, answer)
-      end if
+      known = .false.
+      do
+         call solver%map%load(equations, steps, error)
+         if (allocated(error)) return
+         if (known) call follow_motion(solver%map, position, velocity, visitor, motion, known)
+         if (.not. known) call find_steady_motion(solver%map, solver%map%to_state(start_position, start_velocity), &
+                                                  solver%options, visitor, motion)
+         call describe_motion(motion, answer)
+         if (motion%status == status_diverged) return
+         if (motion%periods == 0) then
+            call measure_window(solver, equations, visitor, motion, answer)
+            accurate = .true.
+            exit
+         end if
+         call measure_periods(solver%map, motion%periods, motion%state, equations, solver%orbit, answer)
+         call solver%map%from_state(motion%state, position, velocity)
+         call judge_motion(solver, equations, position, velocity, motion%periods, visitor, answer, agreed)
+         accurate = .false.
+         if (agreed) accurate = answer%error_estimate <= solver%options%tolerance
+         if (accurate .or. solver%options%steps_per_period > 0 .or. steps >= most_steps) exit
+         steps = better_steps(steps, merge(answer%error_estimate, 1.0_wp, agreed), solver%options)
+         known = agreed
+      end do
       call solver%map%from_state(motion%state, position, velocity)
+      if (.not. accurate) answer%status = status_inaccurate
    end subroutine respond
 
-   !> Measure a periodic motion and its error; take smaller steps where that is wanted and allowed.
-   subroutine measure_periodic(solver, equations, visitor, motion, answer)
-      !> Solver, its map loaded.
-      type(point_solver), intent(inout) :: solver
-      !> Equations of motion of the point.
-      type(equations_type), intent(in) :: equations
-      !> Let in now and then.
-      class(attendant), intent(inout) :: visitor
-      !> The motion; found again with every smaller step.
-      type(steady_motion), intent(inout) :: motion
+   !> Put what the search found into a response.
+   pure subroutine describe_motion(motion, answer)
+      !> The motion.
+      type(steady_motion), intent(in) :: motion
       !> The response.
       type(response), intent(inout) :: answer
 
-      type(response) :: judged
-      real(wp), allocatable :: position(:), velocity(:)
-      integer :: steps
-      logical :: found
+      answer%status = motion%status
+      answer%motion = motion%motion
+      answer%periods_integrated = motion%periods_integrated
+      answer%lyapunov_exponent = motion%lyapunov_exponent
+      answer%lyapunov_error = motion%lyapunov_error
+      if (motion%periods > 0) answer%floquet_magnitude = motion%floquet_magnitude
+   end subroutine describe_motion
 
-      do
-         call measure_periods(solver%map, motion%periods, motion%state, equations, solver%orbit, answer)
-         call solver%map%from_state(motion%state, position, velocity)
-         call judge_motion(solver, equations, position, velocity, motion%periods, visitor, judged, found)
-         if (found) then
-            answer%error_estimate = relative_difference(answer, judged)
-            if (answer%error_estimate <= solver%options%tolerance) exit
-         end if
-         if (solver%options%steps_per_period > 0 .or. solver%map%steps >= most_steps) exit
-         steps = better_steps(solver%map%steps, merge(answer%error_estimate, 1.0_wp, found), solver%options)
-         call refine(solver%map, equations, steps, motion, visitor, found)
-         if (.not. found) exit
-      end do
-      if (.not. answer%error_estimate <= solver%options%tolerance) answer%status = status_inaccurate
-   end subroutine measure_periodic
-
-   !> Find a motion again with smaller steps.
-   subroutine refine(map, equations, steps, motion, visitor, found)
-      !> Period map.
+   !> Find a motion again, near where it was with larger steps; it must still be stable and take as long.
+   subroutine follow_motion(map, position, velocity, visitor, motion, found)
+      !> Period map with the smaller steps.
       class(period_map), intent(inout) :: map
-      !> Equations of motion of the point.
-      type(equations_type), intent(in) :: equations
-      !> Steps per mesh period.
-      integer, intent(in) :: steps
-      !> The motion.
-      type(steady_motion), intent(inout) :: motion
+      !> Section of the motion with the larger ones, shape (n).
+      real(wp), intent(in) :: position(:), velocity(:)
       !> Let in now and then.
       class(attendant), intent(inout) :: visitor
+      !> The motion.
+      type(steady_motion), intent(inout) :: motion
       !> It is there.
       logical, intent(out) :: found
 
       type(periodic_orbit) :: orbit
-      type(error_type), allocatable :: error
-      real(wp), allocatable :: position(:), velocity(:)
+      real(wp) :: start(map%size), magnitude
 
-      found = .false.
-      call map%from_state(motion%state, position, velocity)
-      call map%load(equations, steps, error)
-      if (allocated(error)) return
-      motion%state = map%to_state(position, velocity)
-      call find_orbit(map, motion%state, motion%periods, size_of(map, motion%state), visitor, orbit, found)
-      if (found) motion%state = orbit%state
-   end subroutine refine
+      start = map%to_state(position, velocity)
+      call find_stable_orbit(map, start, motion%periods, size_of(map, start), visitor, orbit, magnitude, &
+                             motion%periods_integrated, found)
+      if (found) found = orbit%periods == motion%periods
+      if (.not. found) return
+      motion%state = orbit%state
+      motion%floquet_magnitude = magnitude
+      motion%lyapunov_exponent = log(max(magnitude, tiny(1.0_wp)))/real(orbit%periods, wp)
+   end subroutine follow_motion
 
-   !> Find and measure a motion with the judging integrator.
-   subroutine judge_motion(solver, equations, position, velocity, periods, visitor, judged, found)
+   !> Find and measure a motion with the judging integrator; the difference is the error estimate.
+   subroutine judge_motion(solver, equations, position, velocity, periods, visitor, answer, agreed)
       !> Solver.
       type(point_solver), intent(inout) :: solver
       !> Equations of motion of the point.
@@ -163,28 +159,52 @@ contains
       integer, intent(in) :: periods
       !> Let in now and then.
       class(attendant), intent(inout) :: visitor
-      !> What the judge measures.
-      type(response), intent(out) :: judged
-      !> The judge finds the motion too.
-      logical, intent(out) :: found
+      !> The response, whose error estimate is filled in.
+      type(response), intent(inout) :: answer
+      !> The judge finds the motion too, stable and with the same period.
+      logical, intent(out) :: agreed
 
+      type(response) :: judged
       type(periodic_orbit) :: orbit
-      type(error_type), allocatable :: error
       real(wp), allocatable :: state(:)
+      real(wp) :: magnitude
+
+      call load_judge(solver, equations, position, velocity, state, agreed)
+      if (.not. agreed) return
+      call find_stable_orbit(solver%judge, state, periods, size_of(solver%judge, state), visitor, orbit, magnitude, &
+                             answer%periods_integrated, agreed)
+      if (agreed) agreed = orbit%periods == periods
+      if (.not. agreed) return
+      judged = empty_response()
+      call measure_periods(solver%judge, periods, orbit%state, equations, solver%orbit, judged)
+      answer%error_estimate = max(relative_difference(equations, answer, judged), solver%judge%roundoff)
+   end subroutine judge_motion
+
+   !> Give the judging integrator a point and a state.
+   subroutine load_judge(solver, equations, position, velocity, state, loaded)
+      !> Solver.
+      type(point_solver), intent(inout) :: solver
+      !> Equations of motion of the point.
+      type(equations_type), intent(in) :: equations
+      !> Section, shape (n).
+      real(wp), intent(in) :: position(:), velocity(:)
+      !> The judge's state, shape (size).
+      real(wp), allocatable, intent(out) :: state(:)
+      !> The judge can integrate the point.
+      logical, intent(out) :: loaded
+
+      type(error_type), allocatable :: error
       integer :: steps
 
-      found = .false.
       ! One more than twice as many: where the grids nest, a crossing can leave both runs with the same interval behind it.
       steps = 2*solver%map%steps + 1
       if (solver%options%integrator == integrator_newmark) steps = first_steps(equations)
       call solver%judge%load(equations, steps, error)
-      if (allocated(error)) return
+      loaded = .not. allocated(error)
+      if (.not. loaded) return
       allocate (state(solver%judge%size))
       state = solver%judge%to_state(position, velocity)
-      call find_orbit(solver%judge, state, periods, size_of(solver%judge, state), visitor, orbit, found)
-      if (.not. found) return
-      call measure_periods(solver%judge, periods, orbit%state, equations, solver%orbit, judged)
-   end subroutine judge_motion
+   end subroutine load_judge
 
    !> Size of a motion from its section [m].
    pure function size_of(map, state) result(scale)
@@ -249,7 +269,8 @@ contains
       end if
    end function contact_of
 
-   !> Measure a motion that is not periodic over a window; its error is what two halves of the window differ by.
+   !> Measure a motion that is not periodic over a window; its error is what two halves of the window, or two integrators, differ
+   !> by.
    subroutine measure_window(solver, equations, visitor, motion, answer)
       !> Solver, its map loaded.
       type(point_solver), intent(inout) :: solver
@@ -262,42 +283,61 @@ contains
       !> The response.
       type(response), intent(inout) :: answer
 
-      type(motion_measure) :: whole, half(2)
-      type(response) :: halves(2)
+      type(motion_measure) :: whole, half(2), judge
+      type(response) :: halves(2), judged
+      real(wp), allocatable :: position(:), velocity(:), state(:)
       real(wp) :: smallest, largest
-      integer :: k, periods, which
+      integer :: k, periods
+      logical :: is_judged
 
+      call solver%map%from_state(motion%state, position, velocity)
+      call load_judge(solver, equations, position, velocity, state, is_judged)
       call whole%reset(equations%static_observation)
       call half(1)%reset(equations%static_observation)
       call half(2)%reset(equations%static_observation)
+      call judge%reset(equations%static_observation)
       smallest = huge(1.0_wp)
       largest = -huge(1.0_wp)
       periods = max(solver%options%measured_periods, 2)
       do k = 1, periods
+         if (is_judged) then
+            call solver%judge%advance(state, orbit=solver%orbit)
+            call judge%add(solver%orbit)
+         end if
          call solver%map%advance(motion%state, orbit=solver%orbit)
-         which = merge(1, 2, 2*k <= periods)
          call whole%add(solver%orbit)
-         call half(which)%add(solver%orbit)
+         call half(merge(1, 2, 2*k <= periods))%add(solver%orbit)
          smallest = min(smallest, solver%map%smallest_deflection)
          largest = max(largest, solver%map%largest_deflection)
          call visitor%attend()
       end do
+      halves = empty_response()
+      judged = empty_response()
       call whole%finish(answer)
       call half(1)%finish(halves(1))
       call half(2)%finish(halves(2))
-      answer%error_estimate = relative_difference(halves(1), halves(2))
+      answer%error_estimate = relative_difference(equations, halves(1), halves(2))
+      if (is_judged) then
+         call judge%finish(judged)
+         answer%error_estimate = max(answer%error_estimate, relative_difference(equations, answer, judged))
+      end if
       answer%contact = contact_of(smallest, largest, equations%mesh%half_backlash)
    end subroutine measure_window
 
-   !> The larger relative difference of two responses in amplitude and in bearing deformation.
-   pure function relative_difference(a, b) result(difference)
+   !> The largest relative difference of two responses in amplitude and in bearing deformation.
+   pure function relative_difference(equations, a, b) result(difference)
+      !> Equations of motion of the point.
+      type(equations_type), intent(in) :: equations
       !> Both responses.
       type(response), intent(in) :: a, b
-      !> Relative difference; zero where both are zero.
+      !> Relative difference; zero where they differ by round-off of the static displacements.
       real(wp) :: difference
 
-      difference = maxval(abs([a%y1_amplitude - b%y1_amplitude, a%bearing_deformation_max - b%bearing_deformation_max]) &
-                          /max([b%y1_amplitude, b%bearing_deformation_max], tiny(1.0_wp)))
+      real(wp) :: noise
+
+      noise = roundoff*max(abs(equations%static_deflection), maxval(abs(equations%static_observation(2:))))
+      difference = maxval(max(abs([a%y1_amplitude - b%y1_amplitude, a%bearing_deformation_max - b%bearing_deformation_max]) &
+                              - noise, 0.0_wp)/max([b%y1_amplitude, b%bearing_deformation_max], tiny(1.0_wp)))
    end function relative_difference
 
 end module spurflex_measure_point

@@ -17,13 +17,19 @@ module spurflex_model_modal
 
    public :: modal_system, new_modal_system, same_modes
 
-   !> Share of the largest mode below which the mesh does not drive a mode.
-   real(wp), parameter :: undriven = 1.0e-14_wp
+   !> Share of the largest mode below which the mesh does not drive a mode: the square of round-off, for the mesh must neither
+   !> drive it nor feel it.
+   real(wp), parameter :: undriven = 1.0e-26_wp
+
+   !> Round-off of a well-conditioned mode after a mesh period, in units of the machine's.
+   real(wp), parameter :: roundoff_units = 64.0_wp
 
    !> The linear part in its modes.
    type :: modal_system
       !> Places: pairs of complex modes and real modes.
       integer :: modes = 0
+      !> Relative error that round-off may leave in a motion: grows where modes nearly meet, as at critical damping [-].
+      real(wp) :: roundoff = 0.0_wp
       !> Eigenvalues lambda_j, shape (modes) [1/s].
       complex(wp), allocatable :: rate(:)
       !> The mode is real: its imaginary part stays zero, shape (modes).
@@ -98,6 +104,8 @@ contains
          modal%to_modes(j, :) = gain(place(j))*inverse(place(j), :)
          modal%from_modes(:, j) = merge(1.0_wp, 2.0_wp, modal%is_real(j))*vectors(:, place(j))/gain(place(j))
       end do
+      modal%roundoff = roundoff_units*epsilon(1.0_wp)*maxval([(sum(abs(inverse(place(j), :)*vectors(:, place(j)))), &
+                                                               j=1, modal%modes)])
       modal%influence = matmul(modal%to_modes(:, n + 1:), drive)
       modal%observation = matmul(equations%observation, modal%from_modes(:n, :))
    end subroutine new_modal_system

@@ -6,7 +6,6 @@
 !> the largest Lyapunov exponent of the transient tells the class of motion.
 module spurflex_steady_search
    use spurflex_base_attendant, only: attendant
-   use spurflex_base_error, only: error_type
    use spurflex_base_kinds, only: wp
    use spurflex_integrate_options, only: solver_options
    use spurflex_integrate_period_map, only: period_map
@@ -14,7 +13,8 @@ module spurflex_steady_search
    use spurflex_steady_outcome, only: steady_motion, status_settled, status_not_settled, status_diverged, &
       motion_unresolved, motion_quasi_periodic, motion_chaotic, motion_of_periods
    use spurflex_steady_sections, only: section_ring, weighted_norm, longest_period
-   use spurflex_steady_shooting, only: periodic_orbit, find_orbit, floquet_multipliers, contact_is_kept
+   use spurflex_steady_shooting, only: periodic_orbit, contact_is_kept
+   use spurflex_steady_stability, only: find_stable_orbit
    implicit none
    private
 
@@ -48,8 +48,8 @@ module spurflex_steady_search
    !> Mesh periods over which a motion that is called quasi-periodic must have been watched.
    integer, parameter :: fewest_periods = 512
 
-   !> Distance of the sections of a motion, beside its size, that is none.
-   real(wp), parameter :: same_section = 1.0e-6_wp
+   !> Relative difference of the ranges of two halves of a motion that has arrived.
+   real(wp), parameter :: same_range = 0.05_wp
 
    !> A state of this norm has left every physical range; far below overflow [m].
    real(wp), parameter :: diverged_norm = 1.0e100_wp
@@ -66,6 +66,10 @@ module spurflex_steady_search
       integer :: periods = 0
       !> The state is finite.
       logical :: sound = .true.
+      !> Norms of the sections while the growth is summed: extremes over the first and the second half [m].
+      real(wp) :: low(2) = huge(1.0_wp), high(2) = -huge(1.0_wp)
+      !> Mesh period at which the second half begins.
+      integer :: half = 0
    end type transient_type
 
 contains
@@ -98,7 +102,12 @@ contains
          call look_for_orbit(map, transient, options, visitor, spent, motion, found)
          if (found .or. .not. transient%sound .or. transient%periods >= options%max_periods) exit
          ! The exponent is that of the latest half or more: what came before was still on its way.
-         if (next_look <= options%max_periods) call transient%growth%reset()
+         if (next_look <= options%max_periods) then
+            call transient%growth%reset()
+            transient%low = huge(1.0_wp)
+            transient%high = -huge(1.0_wp)
+            transient%half = (transient%periods + min(2*next_look - 1, options%max_periods))/2
+         end if
          call advance_transient(map, transient, min(next_look, options%max_periods), visitor)
          if (.not. transient%sound) exit
          next_look = 2*next_look
@@ -125,6 +134,9 @@ contains
       !> Let in between the periods.
       class(attendant), intent(inout) :: visitor
 
+      real(wp) :: norm
+      integer :: which
+
       do while (transient%periods < until)
          if (transient%periods < exponent_from) then
             call map%advance(transient%state)
@@ -134,7 +146,11 @@ contains
          end if
          call transient%ring%add(transient%state)
          transient%periods = transient%periods + 1
-         transient%sound = weighted_norm(map%weight, transient%state) < diverged_norm
+         norm = weighted_norm(map%weight, transient%state)
+         transient%sound = norm < diverged_norm
+         which = merge(1, 2, transient%periods <= transient%half)
+         transient%low(which) = min(transient%low(which), norm)
+         transient%high(which) = max(transient%high(which), norm)
          if (.not. transient%sound) return
          call visitor%attend()
       end do
@@ -158,62 +174,23 @@ contains
       logical, intent(out) :: found
 
       type(periodic_orbit) :: orbit
-      complex(wp), allocatable :: multipliers(:)
-      type(error_type), allocatable :: error
-      real(wp) :: distance
+      real(wp) :: distance, magnitude
       integer :: n
 
       call transient%ring%nearest(n, distance)
-      call find_orbit(map, transient%state, n, max(transient%ring%scale(), abs(map%half_backlash)), visitor, orbit, found, &
-                      only_affine=transient%periods == 0)
-      spent = spent + orbit%integrated
-      if (.not. found) return
-      call reduce_period(map, visitor, spent, orbit)
-      call floquet_multipliers(orbit%monodromy, multipliers, error)
-      found = .not. allocated(error)
-      if (.not. found) return
-      found = maxval(abs(multipliers)) < 1.0_wp
+      call find_stable_orbit(map, transient%state, n, max(transient%ring%scale(), abs(map%half_backlash)), visitor, orbit, &
+                             magnitude, spent, found, only_affine=transient%periods == 0)
       if (.not. found) return
       call approaches(map, orbit, transient, options, visitor, found)
       if (.not. found) return
       motion%status = status_settled
       motion%periods = orbit%periods
       motion%motion = motion_of_periods(orbit%periods)
-      motion%floquet_magnitude = maxval(abs(multipliers))
+      motion%floquet_magnitude = magnitude
       motion%lyapunov_exponent = log(max(motion%floquet_magnitude, tiny(1.0_wp)))/real(orbit%periods, wp)
       motion%lyapunov_error = 0.0_wp
       motion%state = orbit%state
    end subroutine look_for_orbit
-
-   !> Take the shortest period of a motion that was found with a multiple of it.
-   subroutine reduce_period(map, visitor, spent, orbit)
-      !> Period map at an operating point.
-      class(period_map), intent(inout) :: map
-      !> Let in between the periods.
-      class(attendant), intent(inout) :: visitor
-      !> Mesh periods spent on Newton's method, counted up.
-      integer, intent(inout) :: spent
-      !> The motion.
-      type(periodic_orbit), intent(inout) :: orbit
-
-      type(periodic_orbit) :: shorter
-      real(wp) :: moving(size(orbit%state)), scale
-      integer :: k
-      logical :: found
-
-      moving = orbit%state
-      scale = max(weighted_norm(map%weight, orbit%state), map%half_backlash)
-      do k = 1, orbit%periods/2
-         call map%advance(moving)
-         spent = spent + 1
-         if (mod(orbit%periods, k) /= 0) cycle
-         if (weighted_norm(map%weight, moving - orbit%state) > same_section*scale) cycle
-         call find_orbit(map, orbit%state, k, scale, visitor, shorter, found)
-         spent = spent + shorter%integrated
-         if (found) orbit = shorter
-         if (found) return
-      end do
-   end subroutine reduce_period
 
    !> The transient is on its way to a stable motion.
    subroutine approaches(map, orbit, transient, options, visitor, it_does)
@@ -275,12 +252,25 @@ contains
       motion%status = status_settled
       if (motion%lyapunov_exponent > neutral + significance*motion%lyapunov_error) then
          motion%motion = motion_chaotic
-      else if (wander <= neutral_growth .and. periods >= fewest_periods) then
+      else if (wander <= neutral_growth .and. periods >= fewest_periods .and. .not. drifts(transient)) then
          motion%motion = motion_quasi_periodic
       else
          motion%motion = motion_unresolved
          motion%status = status_not_settled
       end if
    end subroutine classify
+
+   !> A motion is still on its way: its sections range over more, or less, in the second half than in the first.
+   pure function drifts(transient) result(it_does)
+      !> The transient.
+      type(transient_type), intent(in) :: transient
+      !> It is.
+      logical :: it_does
+
+      real(wp) :: range(2)
+
+      range = max(transient%high - transient%low, 0.0_wp)
+      it_does = abs(range(2) - range(1)) > same_range*maxval(range)
+   end function drifts
 
 end module spurflex_steady_search

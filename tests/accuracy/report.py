@@ -58,7 +58,7 @@ GRIDS = [
     Grid("resonance 1150-1350", (1150, 1350, 5), SEVEN_ROWS),
     Grid("resonance 1700-2000", (1700, 2000, 7), SEVEN_ROWS),
     Grid("jump 3070-3140", (3070, 3140, 8), SEVEN_ROWS),
-    Grid("irregular 4600-5500", (4630, 5530, 13), SEVEN_ROWS),
+    Grid("irregular 4600-5500", (4600, 5500, 16), SEVEN_ROWS),
     Grid("onset 5380-5450", (5380, 5450, 8), SEVEN_ROWS),
 ]
 SMALL_GRIDS = [Grid("small", (1290, 5490, 4), (1e4, 1e12, 5))]
@@ -329,7 +329,7 @@ class Verdict:
             "true_exponent_error": truth["lyapunov_error"],
         }
         if classes[0] != classes[1]:
-            if truth["motion"] != UNRESOLVED:
+            if UNRESOLVED not in (truth["motion"], point["class"]):
                 self.defects.append(where | {"kind": "class"} | numbers)
             return
         if truth["motion"] <= 0:
@@ -352,8 +352,9 @@ class Verdict:
         judged = error > FLOOR
         ratio = estimate[judged] / error[judged]
         near = (ratio <= FACTOR) & (ratio >= 1 / FACTOR)
-        agree = sum(n for (a, b), n in self.confusion.items() if a == b)
-        known = self.points - self.reference_unresolved
+        told = {k: n for k, n in self.confusion.items() if CLASS_NAMES[UNRESOLVED] not in k}
+        agree = sum(n for (a, b), n in told.items() if a == b)
+        known = sum(told.values())
         return {
             "setting": self.name,
             "points": self.points,
@@ -611,7 +612,9 @@ def main():
     if arguments.small:
         (folder / "reference.csv").unlink(missing_ok=True)
     reference = Reference(arguments.reference.resolve(), folder, arguments.ranks)
-    spurflex = Spurflex(arguments.program.resolve(), shlex.split(arguments.mpiexec), arguments.ranks, folder)
+    runs = folder / "runs"
+    runs.mkdir(exist_ok=True)
+    spurflex = Spurflex(arguments.program.resolve(), shlex.split(arguments.mpiexec), arguments.ranks, runs)
     grids = SMALL_GRIDS if arguments.small else GRIDS
     soft = (lambda _: PERIODS) if arguments.small else periods_of
     points = unique_points(grids)
