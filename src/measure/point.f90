@@ -69,9 +69,9 @@ contains
 
       type(steady_motion) :: motion
       type(error_type), allocatable :: error
-      real(wp), allocatable :: start_position(:), start_velocity(:)
+      real(wp), allocatable :: start_position(:), start_velocity(:), state(:)
       integer :: steps
-      logical :: known, agreed, accurate
+      logical :: by_judge, known, found, agreed, accurate
 
       answer = empty_response()
       answer%status = status_diverged
@@ -79,11 +79,29 @@ contains
       start_velocity = velocity
       steps = solver%options%steps_per_period
       if (steps == 0) steps = first_steps(equations, solver%options)
+      accurate = .false.
       known = .false.
+      by_judge = solver%options%steps_per_period == 0 .and. solver%options%integrator == integrator_newmark
+      if (by_judge) then
+         ! Steps that meet the tolerance on the motion may be too coarse to tell which motion the start leads to.
+         call load_judge(solver, equations, position, velocity, state, known)
+         if (.not. known) return
+         call find_steady_motion(solver%judge, state, solver%options, visitor, motion)
+         call solver%judge%from_state(motion%state, position, velocity)
+      end if
       do
          call solver%map%load(equations, steps, error)
          if (allocated(error)) return
-         if (known) call follow_motion(solver%map, position, velocity, visitor, motion, known)
+         if (known .and. motion%periods > 0) then
+            call follow_motion(solver%map, position, velocity, visitor, motion, found)
+            if (by_judge .and. .not. found .and. steps < most_steps) then
+               steps = better_steps(steps, 1.0_wp, solver%options)
+               cycle
+            end if
+            known = found
+         else if (known) then
+            motion%state = solver%map%to_state(position, velocity)
+         end if
          if (.not. known) call find_steady_motion(solver%map, solver%map%to_state(start_position, start_velocity), &
                                                   solver%options, visitor, motion)
          call describe_motion(motion, answer)
@@ -96,7 +114,6 @@ contains
          call measure_periods(solver%map, motion%periods, motion%state, equations, solver%orbit, answer)
          call solver%map%from_state(motion%state, position, velocity)
          call judge_motion(solver, equations, position, velocity, motion%periods, visitor, answer, agreed)
-         accurate = .false.
          if (agreed) accurate = answer%error_estimate <= solver%options%tolerance
          if (accurate .or. solver%options%steps_per_period > 0 .or. steps >= most_steps) exit
          steps = better_steps(steps, merge(answer%error_estimate, 1.0_wp, agreed), solver%options)
@@ -198,7 +215,7 @@ contains
 
       ! One more than twice as many: where the grids nest, a crossing can leave both runs with the same interval behind it.
       steps = 2*solver%map%steps + 1
-      if (solver%options%integrator == integrator_newmark) steps = first_steps(equations)
+      if (solver%options%integrator == integrator_newmark) steps = 2*first_steps(equations) + 1
       call solver%judge%load(equations, steps, error)
       loaded = .not. allocated(error)
       if (.not. loaded) return
