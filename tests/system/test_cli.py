@@ -40,6 +40,12 @@ def test_help(run):
         assert option in done.stdout
 
 
+def test_key_reference_is_current(run, root):
+    done = run("--keys")
+    assert done.returncode == EXIT_COMPLETE
+    assert done.stdout.strip() == (root / "input" / "README.md").read_text().strip()
+
+
 @pytest.mark.parametrize("ranks", [None, 2])
 def test_unknown_option(run, ranks):
     done = run("--frobnicate", ranks=ranks)
