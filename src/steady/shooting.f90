@@ -23,6 +23,10 @@ module spurflex_steady_shooting
    !> A Newton step this small is accepted where round-off lets it shrink no further.
    real(wp), parameter :: stagnant_step = 1.0e-8_wp
 
+   !> Iterations after which the step must shrink by this factor each, or Newton's method is going nowhere.
+   integer, parameter :: free_iterations = 5
+   real(wp), parameter :: least_shrinkage = 0.5_wp
+
    !> A step this many times the size of the motion leads away from it.
    real(wp), parameter :: runaway = 1.0e3_wp
 
@@ -125,6 +129,7 @@ contains
          previous = length
          length = weighted_norm(map%weight, step)
          if (.not. length < runaway*scale) return
+         if (iteration > free_iterations .and. length > max(least_shrinkage*previous, stagnant_step*scale)) return
          orbit%state = orbit%state + step
          orbit%last_step = length
          call visitor%attend()
