@@ -171,7 +171,7 @@ contains
       !> The case.
       type(case_type), intent(inout) :: case
 
-      integer :: i
+      integer :: i, k
 
       case%title = table%text_of('case', 'title')
       call fill_gears(table, case)
@@ -202,12 +202,14 @@ contains
       case%solver%max_periods = table%integer_of('solver', 'max_periods')
       case%solver%measured_periods = table%integer_of('solver', 'measured_periods')
       case%output%file = table%text_of('output', 'file')
-      allocate (case%output%products(0))
       associate (products => table%values(table%at('output', 'products'))%texts)
+         ! The map is always written.
+         allocate (case%output%products(count([(products(i)%text /= 'map', i=1, size(products))])))
+         k = 0
          do i = 1, size(products)
-            ! The map is always written.
             if (products(i)%text == 'map') cycle
-            case%output%products = [case%output%products, [character(len=16) :: products(i)%text]]
+            k = k + 1
+            case%output%products(k) = products(i)%text
          end do
       end associate
    end subroutine fill_case
