@@ -11,7 +11,7 @@ module spurflex_integrate_collocation
    use spurflex_integrate_collocation_step, only: carry_state, carry_tangents, solve_step
    use spurflex_integrate_exponential, only: step_coefficients, set_step, nodes
    use spurflex_integrate_mesh_table, only: mesh_points, set_mesh_points
-   use spurflex_integrate_period_map, only: period_map, orbit_type, observables, reserve_orbit
+   use spurflex_integrate_period_map, only: period_map, orbit_type, reserve_orbit
    use spurflex_model_equations, only: equations_type
    use spurflex_model_modal, only: modal_system, new_modal_system, same_modes
    implicit none

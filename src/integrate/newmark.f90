@@ -12,7 +12,7 @@ module spurflex_integrate_newmark
    use spurflex_base_kinds, only: wp, pi
    use spurflex_external_lapack, only: invert_positive_definite
    use spurflex_integrate_contact, only: contact_force
-   use spurflex_integrate_period_map, only: period_map, orbit_type, observables, reserve_orbit
+   use spurflex_integrate_period_map, only: period_map, orbit_type, reserve_orbit
    use spurflex_model_equations, only: equations_type
    use spurflex_model_mesh, only: mesh_stiffness, transmission_error, transmission_error_rate
    use spurflex_model_modal, only: modal_system, new_modal_system, same_modes
