@@ -7,7 +7,6 @@ module spurflex_io_hdf5
       h5pclose_f, h5pcreate_f, h5pset_alloc_time_f, h5pset_fill_time_f, h5pset_fill_value_f, h5pset_layout_f, &
       h5pset_obj_track_times_f, h5sclose_f, h5screate_simple_f, hid_t, hsize_t
    use spurflex_base_error, only: error_type, fatal_error
-   use spurflex_base_kinds, only: wp
    use spurflex_measure_response, only: nan
    implicit none
    private
