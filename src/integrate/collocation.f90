@@ -13,7 +13,8 @@ module spurflex_integrate_collocation
    use spurflex_integrate_mesh_table, only: mesh_points, set_mesh_points
    use spurflex_integrate_period_map, only: period_map, orbit_type, reserve_orbit
    use spurflex_model_equations, only: equations_type
-   use spurflex_model_modal, only: modal_system, new_modal_system, same_modes
+   use spurflex_model_modal, only: modal_system, new_modal_system, same_modes, state_weights, to_modes, from_modes, &
+      sum_of_moduli
    implicit none
    private
 
@@ -42,7 +43,7 @@ module spurflex_integrate_collocation
       procedure :: advance => advance_collocation
       procedure :: to_state => modes_from_coordinates
       procedure :: from_state => coordinates_from_modes
-      procedure :: deflection_bound => sum_of_moduli
+      procedure :: deflection_bound => bound_of_modes
    end type collocation_map
 
 contains
@@ -59,7 +60,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       real(wp) :: h
-      integer :: s, k
+      integer :: s
 
       if (.not. same_modes(self%equations, equations)) then
          self%equations%n = 0
@@ -69,11 +70,7 @@ contains
          self%whole = step_coefficients()
          self%part = step_coefficients()
          self%size = 2*self%modal%modes
-         if (allocated(self%weight)) deallocate (self%weight)
-         allocate (self%weight(self%size), source=1.0_wp)
-         do k = 1, self%modal%modes
-            self%weight([k, self%modal%modes + k]) = max(1.0_wp, maxval(abs(self%modal%observation(:, k))))
-         end do
+         self%weight = state_weights(self%modal)
       end if
       self%equations = equations
       self%half_backlash = equations%mesh%half_backlash
@@ -238,12 +235,7 @@ contains
       !> State, shape (size).
       real(wp), allocatable :: state(:)
 
-      complex(wp) :: z(self%modal%modes)
-
-      z = matmul(self%modal%to_modes, cmplx([position, velocity], 0.0_wp, wp))
-      allocate (state(self%size))
-      state(:self%modal%modes) = real(z, wp)
-      state(self%modal%modes + 1:) = merge(0.0_wp, aimag(z), self%modal%is_real)
+      state = to_modes(self%modal, position, velocity)
    end function modes_from_coordinates
 
    !> The coordinates of the equations of motion from the modes.
@@ -257,17 +249,11 @@ contains
       !> Its rate, shape (n).
       real(wp), allocatable, intent(out) :: velocity(:)
 
-      real(wp) :: w(2*self%equations%n)
-      integer :: m
-
-      m = self%modal%modes
-      w = real(matmul(self%modal%from_modes, cmplx(state(:m), state(m + 1:), wp)), wp)
-      position = w(:self%equations%n)
-      velocity = w(self%equations%n + 1:)
+      call from_modes(self%modal, state, position, velocity)
    end subroutine coordinates_from_modes
 
    !> Bound of what a difference of states does to the mesh deflection.
-   pure function sum_of_moduli(self, difference) result(bound)
+   pure function bound_of_modes(self, difference) result(bound)
       !> Map.
       class(collocation_map), intent(in) :: self
       !> Difference of two states, shape (size).
@@ -275,10 +261,7 @@ contains
       !> Sum of the moduli of its modes [m].
       real(wp) :: bound
 
-      integer :: m
-
-      m = self%modal%modes
-      bound = sum(sqrt(difference(:m)**2 + difference(m + 1:)**2))
-   end function sum_of_moduli
+      bound = sum_of_moduli(self%modal, difference)
+   end function bound_of_modes
 
 end module spurflex_integrate_collocation

@@ -14,7 +14,7 @@ module spurflex_integrate_exponential
    implicit none
    private
 
-   public :: step_coefficients, set_step, node, nodes, lagrange, width
+   public :: step_coefficients, set_step, set_point, node, nodes, lagrange, width, last
 
    !> Points of a step.
    integer, parameter :: nodes = 5

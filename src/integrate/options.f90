@@ -38,6 +38,8 @@ module spurflex_integrate_options
       integer :: max_periods = 4000
       !> Mesh periods over which a motion that is not periodic is measured.
       integer :: measured_periods = 200
+      !> The largest Floquet multiplier of periodic motions is asked for.
+      logical :: multipliers = .true.
       !> Which start (`start_rest` ...).
       integer :: start = start_static
    end type solver_options

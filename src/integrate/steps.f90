@@ -3,10 +3,11 @@ module spurflex_integrate_steps
    use spurflex_base_kinds, only: wp, pi
    use spurflex_integrate_options, only: solver_options, integrator_newmark
    use spurflex_model_equations, only: equations_type
+   use spurflex_model_modal, only: modal_system
    implicit none
    private
 
-   public :: first_steps, better_steps, most_steps
+   public :: first_steps, better_steps, most_steps, aim, first_lane_steps, better_lane_steps, most_lane_steps
 
    !> Steps per mesh period at most.
    integer, parameter :: most_steps = 65536
@@ -19,6 +20,21 @@ module spurflex_integrate_steps
 
    !> The same for Newmark's method: its error is then about 1e-3 [rad].
    real(wp), parameter :: newmark_phase = 0.15_wp
+
+   !> The same for collocation in lanes: its error is then about 1e-5 where a tolerance of 1e-3 is asked for [rad].
+   real(wp), parameter :: lane_phase = 0.7_wp, lane_tolerance = 1.0e-3_wp
+
+   !> Steps that lanes may have: points in one vector have the same.
+   integer, parameter :: lane_steps(14) = [16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024, 1536]
+
+   !> Most steps to begin with, and most by which a tolerance is met, in lanes.
+   integer, parameter :: most_lane_steps = 1024, most_refined_steps = 192
+
+   !> Share of what gives way to the mesh force from which on a mode is felt.
+   real(wp), parameter :: felt_share = 0.02_wp
+
+   !> Order of collocation in lanes.
+   real(wp), parameter :: lane_order = 4.0_wp
 
    !> Aim at this share of the tolerance.
    real(wp), parameter :: aim = 0.5_wp
@@ -37,26 +53,87 @@ contains
       !> Steps per mesh period.
       integer :: steps
 
-      real(wp) :: cycle, inverse_mass
-      integer :: i, harmonics
+      real(wp) :: phase
       logical :: is_newmark
+
+      phase = cycle_phase(equations)
+      is_newmark = .false.
+      if (present(options)) is_newmark = options%integrator == integrator_newmark
+      if (is_newmark) then
+         steps = max(fewest_newmark, nint(min(phase/newmark_phase, real(most_steps, wp))))
+      else
+         steps = max(fewest_collocation, nint(min(phase/collocation_phase, real(most_steps, wp))))
+      end if
+   end function first_steps
+
+   !> Phase of the free vibration of the mesh, or of the highest harmonic of the excitation, in a mesh period.
+   pure function cycle_phase(equations) result(phase)
+      !> Equations of motion.
+      type(equations_type), intent(in) :: equations
+      !> The phase [rad].
+      real(wp) :: phase
+
+      real(wp) :: inverse_mass
+      integer :: i, harmonics
 
       ! Free vibration of the mesh with every body on its own: near enough to begin with.
       inverse_mass = 0.0_wp
       do i = 1, equations%n
          inverse_mass = inverse_mass + equations%direction(i)**2/equations%mass(i, i)
       end do
-      cycle = 2.0_wp*pi/equations%frequency*sqrt(equations%mesh%mean_stiffness*inverse_mass)
+      phase = 2.0_wp*pi/equations%frequency*sqrt(equations%mesh%mean_stiffness*inverse_mass)
       harmonics = max(size(equations%mesh%stiffness_coefficients), size(equations%mesh%error_amplitudes))
-      cycle = max(cycle, 2.0_wp*pi*real(harmonics, wp))
-      is_newmark = .false.
-      if (present(options)) is_newmark = options%integrator == integrator_newmark
-      if (is_newmark) then
-         steps = max(fewest_newmark, nint(min(cycle/newmark_phase, real(most_steps, wp))))
-      else
-         steps = max(fewest_collocation, nint(min(cycle/collocation_phase, real(most_steps, wp))))
-      end if
-   end function first_steps
+      phase = max(phase, 2.0_wp*pi*real(harmonics, wp))
+   end function cycle_phase
+
+   !> Steps of collocation in lanes to begin with.
+   pure function first_lane_steps(equations, modal, tolerance) result(steps)
+      !> Equations of motion.
+      type(equations_type), intent(in) :: equations
+      !> Modes of their linear part.
+      type(modal_system), intent(in) :: modal
+      !> Relative error that is asked for.
+      real(wp), intent(in) :: tolerance
+      !> Steps per mesh period; more than `most_lane_steps` where lanes are no use.
+      integer :: steps
+
+      real(wp) :: give(modal%modes), fastest, finer
+      integer :: harmonics
+
+      ! The mesh feels the modes in the measure in which they give way to it; the others follow at once.
+      give = abs(modal%influence/modal%rate)
+      fastest = maxval(abs(modal%rate), mask=give >= felt_share*sum(give))
+      harmonics = max(size(equations%mesh%stiffness_coefficients), size(equations%mesh%error_amplitudes))
+      ! The steps that find a motion need not meet the tolerance on it, but who asks for more wants to be surer of it.
+      finer = max(lane_tolerance/tolerance, 1.0_wp)**(0.5_wp/lane_order)
+      steps = next_lane_steps(finer*max(2.0_wp*pi*max(fastest/equations%frequency, real(harmonics, wp))/lane_phase, &
+                                        real(lane_steps(1), wp)))
+   end function first_lane_steps
+
+   !> Steps of collocation in lanes that should meet the tolerance.
+   pure function better_lane_steps(steps, error, tolerance) result(better)
+      !> Steps per mesh period.
+      integer, intent(in) :: steps
+      !> Their relative error.
+      real(wp), intent(in) :: error
+      !> Relative error that is asked for.
+      real(wp), intent(in) :: tolerance
+      !> More steps per mesh period; zero where lanes are no use.
+      integer :: better
+
+      better = next_lane_steps(real(steps, wp)*max((error/(aim*tolerance))**(1.0_wp/lane_order), least_growth))
+      if (better <= steps .or. better > max(most_refined_steps, 2*steps)) better = 0
+   end function better_lane_steps
+
+   !> The next number of steps that lanes may have.
+   pure function next_lane_steps(wanted) result(steps)
+      !> Steps wanted.
+      real(wp), intent(in) :: wanted
+      !> As many or more, if lanes may have as many.
+      integer :: steps
+
+      steps = lane_steps(min(count(real(lane_steps, wp) < wanted) + 1, size(lane_steps)))
+   end function next_lane_steps
 
    !> Steps that should meet the tolerance, from the error of the steps there are.
    pure function better_steps(steps, error, options) result(better)

@@ -187,18 +187,19 @@ contains
 
       eta = nan()
       call require(size(results%rigid%variables) > 0, error)
-      if (.not. allocated(error)) call write_points(results%rigid, [first_speed], responses, eta, error)
+      if (.not. allocated(error)) call write_points(results%rigid, [first_speed], [size(responses)], responses, &
+                                                    eta, error)
    end subroutine write_rigid
 
    !> Write responses on the flexible support. Each rank writes for itself.
-   subroutine write_flexible(results, stiffness_index, first_speed, responses, eta, error)
+   subroutine write_flexible(results, first_stiffness, stiffnesses, first_speed, responses, eta, error)
       !> The open file.
       type(results_file), intent(in) :: results
-      !> Index of the support stiffness, from 1.
-      integer, intent(in) :: stiffness_index
+      !> Index of the first support stiffness, from 1, and number of consecutive ones.
+      integer, intent(in) :: first_stiffness, stiffnesses
       !> Index of the first speed, from 1.
       integer, intent(in) :: first_speed
-      !> Responses at consecutive speeds, shape (points).
+      !> Responses at consecutive speeds for one stiffness after the other, shape (points).
       type(response), intent(in) :: responses(:)
       !> Change of each bearing's largest deformation by the flexible support and its error [percent], shape (3, points);
       !> not written if the rigid support is not asked for, NaN if absent.
@@ -212,7 +213,8 @@ contains
       if (present(eta)) known_eta = eta
       call require(size(results%flexible%variables) > 0, error)
       if (allocated(error)) return
-      call write_points(results%flexible, [first_speed, stiffness_index], responses, known_eta, error)
+      call write_points(results%flexible, [first_speed, first_stiffness], [size(responses)/stiffnesses, stiffnesses], responses, &
+                        known_eta, error)
    end subroutine write_flexible
 
    !> Make the file under another name, so that what has the final name is always whole.

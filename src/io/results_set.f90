@@ -91,13 +91,15 @@ contains
       set%space = -1_hid_t
    end subroutine close_set
 
-   !> Write a run of points along the fastest axis. Each rank writes for itself.
-   subroutine write_points(set, first, responses, eta, error)
+   !> Write a block of points. Each rank writes for itself.
+   subroutine write_points(set, first, extent, responses, eta, error)
       !> The set.
       type(variable_set), intent(in) :: set
       !> First point from 1, fastest index first, shape (dimensions).
       integer, intent(in) :: first(:)
-      !> Responses, shape (points).
+      !> Extents of the block, fastest index first, shape (dimensions).
+      integer, intent(in) :: extent(:)
+      !> Responses in the order of the file, shape (points).
       type(response), intent(in) :: responses(:)
       !> Changes by the flexible support [percent], shape (2, points); NaN where unknown.
       real(wp), intent(in) :: eta(:, :)
@@ -106,12 +108,10 @@ contains
 
       type(run_type) :: run
       real(wp) :: reals(size(responses))
-      integer :: integers(size(responses)), count(size(first)), i
+      integer :: integers(size(responses)), i
 
       if (size(responses) == 0) return
-      count = 1
-      count(1) = size(responses)
-      call select_run(run, set%space, first, count, error)
+      call select_run(run, set%space, first, extent, error)
       if (allocated(error)) return
       reals = nan()
       integers = 0

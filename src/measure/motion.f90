@@ -92,31 +92,35 @@ contains
       !> Smallest and largest value so far, updated.
       real(wp), intent(inout) :: low, high
 
-      real(wp) :: turns(size(value))
-      integer :: s, found
+      real(wp) :: h, room
+      integer :: s
 
-      found = 0
+      low = min(low, minval(value))
+      high = max(high, maxval(value))
       do s = 2, size(time)
-         if (rate(s - 1)*rate(s) >= 0.0_wp .or. time(s) <= time(s - 1)) cycle
-         found = found + 1
-         turns(found) = turning_value(time(s) - time(s - 1), value(s - 1:s), rate(s - 1:s), acceleration(s - 1:s))
+         h = time(s) - time(s - 1)
+         if (h <= 0.0_wp) cycle
+         ! No turn, unless the rate comes back before it reaches zero.
+         if (rate(s - 1)*rate(s) > 0.0_wp) then
+            if (rate(s - 1)*acceleration(s - 1) >= 0.0_wp .or. rate(s)*acceleration(s) <= 0.0_wp) cycle
+         end if
+         ! Only a turn that can reach beyond what has been seen is worth its place.
+         room = h*(max(abs(rate(s - 1)), abs(rate(s))) + h*max(abs(acceleration(s - 1)), abs(acceleration(s))))
+         if (max(value(s - 1), value(s)) + room <= high .and. min(value(s - 1), value(s)) - room >= low) cycle
+         call see_turns(h, value(s - 1:s), rate(s - 1:s), acceleration(s - 1:s), low, high)
       end do
-      low = min(low, minval(value), minval(turns(:found)))
-      high = max(high, maxval(value), maxval(turns(:found)))
    end subroutine extremes
 
-   !> Value where the polynomial of degree five through both ends of a step turns.
-   pure function turning_value(h, value, rate, acceleration) result(turn)
+   !> See the values where the polynomial of degree five through both ends of a step turns.
+   pure subroutine see_turns(h, value, rate, acceleration, low, high)
       !> Length of the step [s].
       real(wp), intent(in) :: h
-      !> Values, rates and accelerations at both ends; the rates differ in sign.
+      !> Values, rates and accelerations at both ends.
       real(wp), intent(in) :: value(2), rate(2), acceleration(2)
-      !> The extreme.
-      real(wp) :: turn
+      !> Smallest and largest value so far, updated.
+      real(wp), intent(inout) :: low, high
 
-      integer, parameter :: bisections = 40
-      real(wp) :: c(0:5), low, high, u, slope, rest(3)
-      integer :: k
+      real(wp) :: c(0:5), slope(0:4), bend(0:3), rest(3), u, turn
 
       c(0) = value(1)
       c(1) = h*rate(1)
@@ -125,19 +129,84 @@ contains
       c(3) = 10.0_wp*rest(1) - 4.0_wp*rest(2) + 0.5_wp*rest(3)
       c(4) = -15.0_wp*rest(1) + 7.0_wp*rest(2) - rest(3)
       c(5) = 6.0_wp*rest(1) - 3.0_wp*rest(2) + 0.5_wp*rest(3)
-      low = 0.0_wp
-      high = 1.0_wp
-      do k = 1, bisections
-         u = 0.5_wp*(low + high)
-         slope = c(1) + u*(2.0_wp*c(2) + u*(3.0_wp*c(3) + u*(4.0_wp*c(4) + u*5.0_wp*c(5))))
-         if (slope*rate(1) > 0.0_wp) then
+      slope = [c(1), 2.0_wp*c(2), 3.0_wp*c(3), 4.0_wp*c(4), 5.0_wp*c(5)]
+      if (rate(1)*rate(2) <= 0.0_wp) then
+         turn = polynomial(c, zero(slope, 0.0_wp, 1.0_wp))
+         low = min(low, turn)
+         high = max(high, turn)
+         return
+      end if
+      bend = [slope(1), 2.0_wp*slope(2), 3.0_wp*slope(3), 4.0_wp*slope(4)]
+      u = zero(bend, 0.0_wp, 1.0_wp)
+      if (polynomial(slope, u)*rate(1) >= 0.0_wp) return
+      turn = polynomial(c, zero(slope, 0.0_wp, u))
+      low = min(low, turn)
+      high = max(high, turn)
+      turn = polynomial(c, zero(slope, u, 1.0_wp))
+      low = min(low, turn)
+      high = max(high, turn)
+   end subroutine see_turns
+
+   !> A zero of a polynomial between two places where it differs in sign.
+   pure function zero(c, from, until) result(u)
+      !> Its coefficients, constant first.
+      real(wp), intent(in) :: c(0:)
+      !> The places.
+      real(wp), intent(in) :: from, until
+      !> The zero.
+      real(wp) :: u
+
+      !> What turns there is off by the square of what the place is off.
+      real(wp), parameter :: near_enough = 1.0e-9_wp
+      integer, parameter :: most_iterations = 40
+      real(wp) :: low, high, at_low, at_high, value, slope, better
+      integer :: k, i
+
+      low = from
+      high = until
+      at_low = polynomial(c, low)
+      at_high = polynomial(c, high)
+      u = low
+      if (abs(at_low - at_high) > 0.0_wp) u = low + (high - low)*min(max(at_low/(at_low - at_high), 0.0_wp), 1.0_wp)
+      ! Newton's method, kept between the places where the sign is known to differ.
+      do k = 1, most_iterations
+         value = c(ubound(c, 1))
+         slope = 0.0_wp
+         do i = ubound(c, 1) - 1, 0, -1
+            slope = slope*u + value
+            value = value*u + c(i)
+         end do
+         if (value*at_low > 0.0_wp) then
             low = u
          else
             high = u
          end if
+         better = 0.5_wp*(low + high)
+         if (abs(value) < abs(slope)) then
+            if (u - value/slope > low .and. u - value/slope < high) better = u - value/slope
+         end if
+         if (abs(better - u) <= near_enough) exit
+         u = better
       end do
-      turn = c(0) + u*(c(1) + u*(c(2) + u*(c(3) + u*(c(4) + u*c(5)))))
-   end function turning_value
+      u = better
+   end function zero
+
+   !> A polynomial at a place.
+   pure function polynomial(c, u) result(value)
+      !> Its coefficients, constant first.
+      real(wp), intent(in) :: c(0:)
+      !> The place.
+      real(wp), intent(in) :: u
+      !> Its value there.
+      real(wp) :: value
+
+      integer :: i
+
+      value = c(ubound(c, 1))
+      do i = ubound(c, 1) - 1, 0, -1
+         value = value*u + c(i)
+      end do
+   end function polynomial
 
    !> Write what was found into a response.
    pure subroutine finish(self, answer)

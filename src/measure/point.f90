@@ -1,4 +1,5 @@
-!> The measured response of one operating point: find the steady motion, measure it, and measure how good the numbers are.
+!> The measured response of one operating point on its own: find the steady motion, measure it, and measure how good the numbers
+!> are.
 !>
 !> A periodic motion is found a second time by other means, exponential collocation with less than half the step, and the
 !> difference is the error estimate. Where the step is free it is halved until the estimate meets the tolerance. The numbers
@@ -8,26 +9,25 @@ module spurflex_measure_point
    use spurflex_base_error, only: error_type
    use spurflex_base_kinds, only: wp
    use spurflex_integrate_collocation, only: collocation_map
+   use spurflex_integrate_ensemble, only: solo_ensemble, new_solo
    use spurflex_integrate_factory, only: make_map
    use spurflex_integrate_options, only: solver_options, integrator_newmark
    use spurflex_integrate_period_map, only: period_map, orbit_type
    use spurflex_integrate_steps, only: first_steps, better_steps, most_steps
    use spurflex_measure_motion, only: motion_measure
-   use spurflex_measure_response, only: response, empty_response, status_inaccurate, status_diverged, &
-      contact_kept, contact_lost, contact_both_flanks
+   use spurflex_measure_response, only: response, empty_response, status_missing, status_inaccurate, &
+      status_diverged, contact_of, &
+      describe_motion, relative_difference
    use spurflex_model_equations, only: equations_type
    use spurflex_steady_outcome, only: steady_motion
-   use spurflex_steady_search, only: find_steady_motion
+   use spurflex_steady_search, only: find_steady_motion, describe_orbit
    use spurflex_steady_sections, only: weighted_norm
-   use spurflex_steady_shooting, only: periodic_orbit
-   use spurflex_steady_stability, only: find_stable_orbit
+   use spurflex_steady_shooting, only: periodic_orbit, find_orbit
+   use spurflex_steady_stability, only: find_stable_orbits
    implicit none
    private
 
-   public :: point_solver, new_point_solver, respond
-
-   !> Relative difference of displacements that is round-off.
-   real(wp), parameter :: roundoff = 1.0e-14_wp
+   public :: point_solver, new_point_solver, respond_alone
 
    !> What solves points one after the other; keeps what the next point can use again.
    type :: point_solver
@@ -55,23 +55,25 @@ contains
    end subroutine new_point_solver
 
    !> The response of one point. A point that fails is a status in the response, not an error.
-   subroutine respond(solver, equations, position, velocity, visitor, answer)
+   subroutine respond_alone(solver, equations, position, velocity, visitor, motion, answer)
       !> Solver.
       type(point_solver), intent(inout) :: solver
       !> Equations of motion of the point.
       type(equations_type), intent(in) :: equations
-      !> Deviation from the static equilibrium and its rate: at the start before, at the last section after, shape (n).
+      !> Deviation from the static equilibrium and its rate: at the start, or at a section of the motion if that is known, before;
+      !> at the last section after, shape (n).
       real(wp), allocatable, intent(inout) :: position(:), velocity(:)
       !> Let in now and then.
       class(attendant), intent(inout) :: visitor
+      !> The motion, with the status `status_missing` if it is not known.
+      type(steady_motion), intent(inout) :: motion
       !> The response.
       type(response), intent(out) :: answer
 
-      type(steady_motion) :: motion
       type(error_type), allocatable :: error
       real(wp), allocatable :: start_position(:), start_velocity(:), state(:)
       integer :: steps
-      logical :: by_judge, known, found, agreed, accurate
+      logical :: is_free, known, found, agreed, accurate
 
       answer = empty_response()
       answer%status = status_diverged
@@ -80,9 +82,9 @@ contains
       steps = solver%options%steps_per_period
       if (steps == 0) steps = first_steps(equations, solver%options)
       accurate = .false.
-      known = .false.
-      by_judge = solver%options%steps_per_period == 0 .and. solver%options%integrator == integrator_newmark
-      if (by_judge) then
+      known = motion%status /= status_missing
+      is_free = solver%options%steps_per_period == 0 .and. solver%options%integrator == integrator_newmark
+      if (is_free .and. .not. known) then
          ! Steps that meet the tolerance on the motion may be too coarse to tell which motion the start leads to.
          call load_judge(solver, equations, position, velocity, state, known)
          if (.not. known) return
@@ -93,8 +95,8 @@ contains
          call solver%map%load(equations, steps, error)
          if (allocated(error)) return
          if (known .and. motion%periods > 0) then
-            call follow_motion(solver%map, position, velocity, visitor, motion, found)
-            if (by_judge .and. .not. found .and. steps < most_steps) then
+            call follow_motion(solver%map, position, velocity, visitor, solver%options, motion, found)
+            if (is_free .and. .not. found .and. steps < most_steps) then
                steps = better_steps(steps, 1.0_wp, solver%options)
                cycle
             end if
@@ -121,47 +123,34 @@ contains
       end do
       call solver%map%from_state(motion%state, position, velocity)
       if (.not. accurate) answer%status = status_inaccurate
-   end subroutine respond
-
-   !> Put what the search found into a response.
-   pure subroutine describe_motion(motion, answer)
-      !> The motion.
-      type(steady_motion), intent(in) :: motion
-      !> The response.
-      type(response), intent(inout) :: answer
-
-      answer%status = motion%status
-      answer%motion = motion%motion
-      answer%periods_integrated = motion%periods_integrated
-      answer%lyapunov_exponent = motion%lyapunov_exponent
-      answer%lyapunov_error = motion%lyapunov_error
-      if (motion%periods > 0) answer%floquet_magnitude = motion%floquet_magnitude
-   end subroutine describe_motion
+   end subroutine respond_alone
 
    !> Find a motion again, near where it was with larger steps; it must still be stable and take as long.
-   subroutine follow_motion(map, position, velocity, visitor, motion, found)
+   subroutine follow_motion(map, position, velocity, visitor, options, motion, found)
       !> Period map with the smaller steps.
-      class(period_map), intent(inout) :: map
+      class(period_map), intent(inout), target :: map
       !> Section of the motion with the larger ones, shape (n).
       real(wp), intent(in) :: position(:), velocity(:)
       !> Let in now and then.
       class(attendant), intent(inout) :: visitor
+      !> Whether multipliers are asked for.
+      type(solver_options), intent(in) :: options
       !> The motion.
       type(steady_motion), intent(inout) :: motion
       !> It is there.
       logical, intent(out) :: found
 
-      type(periodic_orbit) :: orbit
-      real(wp) :: start(map%size), magnitude
+      type(solo_ensemble) :: solo
+      type(periodic_orbit) :: orbit(1)
+      logical :: is_found(1)
 
-      start = map%to_state(position, velocity)
-      call find_stable_orbit(map, start, motion%periods, size_of(map, start), visitor, orbit, magnitude, &
-                             motion%periods_integrated, found)
-      if (found) found = orbit%periods == motion%periods
-      if (.not. found) return
-      motion%state = orbit%state
-      motion%floquet_magnitude = magnitude
-      motion%lyapunov_exponent = log(max(magnitude, tiny(1.0_wp)))/real(orbit%periods, wp)
+      call new_solo(map, solo)
+      orbit(1)%state = map%to_state(position, velocity)
+      orbit(1)%periods = motion%periods
+      call find_stable_orbits(solo, [1], [size_of(map, orbit(1)%state)], visitor, orbit, is_found)
+      motion%periods_integrated = motion%periods_integrated + orbit(1)%integrated
+      found = is_found(1) .and. orbit(1)%periods == motion%periods
+      if (found) call describe_orbit(orbit(1), options, motion)
    end subroutine follow_motion
 
    !> Find and measure a motion with the judging integrator; the difference is the error estimate.
@@ -184,13 +173,11 @@ contains
       type(response) :: judged
       type(periodic_orbit) :: orbit
       real(wp), allocatable :: state(:)
-      real(wp) :: magnitude
 
       call load_judge(solver, equations, position, velocity, state, agreed)
       if (.not. agreed) return
-      call find_stable_orbit(solver%judge, state, periods, size_of(solver%judge, state), visitor, orbit, magnitude, &
-                             answer%periods_integrated, agreed)
-      if (agreed) agreed = orbit%periods == periods
+      call find_orbit(solver%judge, state, periods, size_of(solver%judge, state), visitor, orbit, agreed)
+      answer%periods_integrated = answer%periods_integrated + orbit%integrated
       if (.not. agreed) return
       judged = empty_response()
       call measure_periods(solver%judge, periods, orbit%state, equations, solver%orbit, judged)
@@ -268,24 +255,6 @@ contains
       answer%contact = contact_of(smallest, largest, equations%mesh%half_backlash)
    end subroutine measure_periods
 
-   !> Whether the teeth part.
-   pure function contact_of(smallest, largest, half_backlash) result(contact)
-      !> Extremes of the mesh deflection [m].
-      real(wp), intent(in) :: smallest, largest
-      !> Half of the backlash [m].
-      real(wp), intent(in) :: half_backlash
-      !> `contact_...`.
-      integer :: contact
-
-      if (smallest >= half_backlash .or. largest <= -half_backlash) then
-         contact = contact_kept
-      else if (largest >= half_backlash .and. smallest <= -half_backlash) then
-         contact = contact_both_flanks
-      else
-         contact = contact_lost
-      end if
-   end function contact_of
-
    !> Measure a motion that is not periodic over a window; its error is what two halves of the window, or two integrators, differ
    !> by.
    subroutine measure_window(solver, equations, visitor, motion, answer)
@@ -340,21 +309,5 @@ contains
       end if
       answer%contact = contact_of(smallest, largest, equations%mesh%half_backlash)
    end subroutine measure_window
-
-   !> The largest relative difference of two responses in amplitude and in bearing deformation.
-   pure function relative_difference(equations, a, b) result(difference)
-      !> Equations of motion of the point.
-      type(equations_type), intent(in) :: equations
-      !> Both responses.
-      type(response), intent(in) :: a, b
-      !> Relative difference; zero where they differ by round-off of the static displacements.
-      real(wp) :: difference
-
-      real(wp) :: noise
-
-      noise = roundoff*max(abs(equations%static_deflection), maxval(abs(equations%static_observation(2:))))
-      difference = maxval(max(abs([a%y1_amplitude - b%y1_amplitude, a%bearing_deformation_max - b%bearing_deformation_max]) &
-                              - noise, 0.0_wp)/max([b%y1_amplitude, b%bearing_deformation_max], tiny(1.0_wp)))
-   end function relative_difference
 
 end module spurflex_measure_point

@@ -2,15 +2,19 @@
 module spurflex_measure_response
    use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
    use spurflex_base_kinds, only: wp
+   use spurflex_model_equations, only: equations_type
    use spurflex_steady_outcome, only: status_missing, status_settled, status_not_settled, status_diverged, status_inaccurate, &
-      contact_kept, contact_lost, contact_both_flanks, motion_unresolved, motion_quasi_periodic, motion_chaotic
+      contact_kept, contact_lost, contact_both_flanks, motion_unresolved, motion_quasi_periodic, motion_chaotic, steady_motion
    implicit none
    private
 
-   public :: response, empty_response, nan
+   public :: response, empty_response, nan, contact_of, describe_motion, relative_difference
    public :: status_missing, status_settled, status_not_settled, status_diverged, status_inaccurate
    public :: contact_kept, contact_lost, contact_both_flanks
    public :: motion_unresolved, motion_quasi_periodic, motion_chaotic
+
+   !> Relative difference of displacements that is round-off.
+   real(wp), parameter :: roundoff = 1.0e-14_wp
 
    !> Steady response of one point. Angles in rad, SI units.
    type :: response
@@ -69,5 +73,54 @@ contains
       empty%periods_integrated = 0
       empty%contact = contact_kept
    end function empty_response
+
+   !> Put what the search found into a response.
+   pure subroutine describe_motion(motion, answer)
+      !> The motion.
+      type(steady_motion), intent(in) :: motion
+      !> The response.
+      type(response), intent(inout) :: answer
+
+      answer%status = motion%status
+      answer%motion = motion%motion
+      answer%periods_integrated = motion%periods_integrated
+      answer%lyapunov_exponent = motion%lyapunov_exponent
+      answer%lyapunov_error = motion%lyapunov_error
+      if (motion%periods > 0) answer%floquet_magnitude = motion%floquet_magnitude
+   end subroutine describe_motion
+
+   !> Whether the teeth part.
+   pure function contact_of(smallest, largest, half_backlash) result(contact)
+      !> Extremes of the mesh deflection [m].
+      real(wp), intent(in) :: smallest, largest
+      !> Half of the backlash [m].
+      real(wp), intent(in) :: half_backlash
+      !> `contact_...`.
+      integer :: contact
+
+      if (smallest >= half_backlash .or. largest <= -half_backlash) then
+         contact = contact_kept
+      else if (largest >= half_backlash .and. smallest <= -half_backlash) then
+         contact = contact_both_flanks
+      else
+         contact = contact_lost
+      end if
+   end function contact_of
+
+   !> The largest relative difference of two responses in amplitude and in bearing deformation.
+   pure function relative_difference(equations, a, b) result(difference)
+      !> Equations of motion of the point.
+      type(equations_type), intent(in) :: equations
+      !> Both responses.
+      type(response), intent(in) :: a, b
+      !> Relative difference; zero where they differ by round-off of the static displacements.
+      real(wp) :: difference
+
+      real(wp) :: noise
+
+      noise = roundoff*max(abs(equations%static_deflection), maxval(abs(equations%static_observation(2:))))
+      difference = maxval(max(abs([a%y1_amplitude - b%y1_amplitude, a%bearing_deformation_max - b%bearing_deformation_max]) &
+                              - noise, 0.0_wp)/max([b%y1_amplitude, b%bearing_deformation_max], tiny(1.0_wp)))
+   end function relative_difference
 
 end module spurflex_measure_response

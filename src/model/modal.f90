@@ -16,6 +16,7 @@ module spurflex_model_modal
    private
 
    public :: modal_system, new_modal_system, same_modes
+   public :: state_weights, to_modes, from_modes, sum_of_moduli
 
    !> Share of the largest mode below which the mesh does not drive a mode: the square of round-off, for the mesh must neither
    !> drive it nor feel it.
@@ -140,5 +141,64 @@ contains
                               .or. abs(a%mesh%mean_stiffness - b%mesh%mean_stiffness) > 0.0_wp &
                               .or. abs(a%mesh%damping - b%mesh%damping) > 0.0_wp)
    end function same_modes
+
+   !> What a component of a state, real parts of the modes and then imaginary parts, counts for in a norm in metres.
+   pure function state_weights(modal) result(weight)
+      !> Modes.
+      type(modal_system), intent(in) :: modal
+      !> Largest displacement of each mode, the mesh deflection included, shape (2 modes).
+      real(wp) :: weight(2*modal%modes)
+
+      integer :: k
+
+      do k = 1, modal%modes
+         weight([k, modal%modes + k]) = max(1.0_wp, maxval(abs(modal%observation(:, k))))
+      end do
+   end function state_weights
+
+   !> The modes from the coordinates of the equations of motion.
+   pure function to_modes(modal, position, velocity) result(state)
+      !> Modes.
+      type(modal_system), intent(in) :: modal
+      !> Deviation from the static equilibrium and its rate, shape (n).
+      real(wp), intent(in) :: position(:), velocity(:)
+      !> Real parts, then imaginary parts, shape (2 modes).
+      real(wp) :: state(2*modal%modes)
+
+      complex(wp) :: z(modal%modes)
+
+      z = matmul(modal%to_modes, cmplx([position, velocity], 0.0_wp, wp))
+      state(:modal%modes) = real(z, wp)
+      state(modal%modes + 1:) = merge(0.0_wp, aimag(z), modal%is_real)
+   end function to_modes
+
+   !> The coordinates of the equations of motion from the modes.
+   pure subroutine from_modes(modal, state, position, velocity)
+      !> Modes.
+      type(modal_system), intent(in) :: modal
+      !> Real parts, then imaginary parts, shape (2 modes).
+      real(wp), intent(in) :: state(:)
+      !> Deviation from the static equilibrium and its rate, shape (n).
+      real(wp), allocatable, intent(out) :: position(:), velocity(:)
+
+      real(wp) :: w(size(modal%from_modes, 1))
+
+      w = real(matmul(modal%from_modes, cmplx(state(:modal%modes), state(modal%modes + 1:), wp)), wp)
+      position = w(:size(w)/2)
+      velocity = w(size(w)/2 + 1:)
+   end subroutine from_modes
+
+   !> Bound of what a difference of states does to the mesh deflection at any later time, while contact is kept and the mesh
+   !> stiffness is the mean one.
+   pure function sum_of_moduli(modal, difference) result(bound)
+      !> Modes.
+      type(modal_system), intent(in) :: modal
+      !> Difference of two states, shape (2 modes).
+      real(wp), intent(in) :: difference(:)
+      !> Sum of the moduli of its modes [m].
+      real(wp) :: bound
+
+      bound = sum(sqrt(difference(:modal%modes)**2 + difference(modal%modes + 1:)**2))
+   end function sum_of_moduli
 
 end module spurflex_model_modal

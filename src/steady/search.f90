@@ -7,24 +7,28 @@
 module spurflex_steady_search
    use spurflex_base_attendant, only: attendant
    use spurflex_base_kinds, only: wp
+   use spurflex_integrate_ensemble, only: ensemble, solo_ensemble, new_solo
    use spurflex_integrate_options, only: solver_options
    use spurflex_integrate_period_map, only: period_map
-   use spurflex_steady_lyapunov, only: lyapunov_sum
-   use spurflex_steady_outcome, only: steady_motion, status_settled, status_not_settled, status_diverged, &
-      motion_unresolved, motion_quasi_periodic, motion_chaotic, motion_of_periods
-   use spurflex_steady_sections, only: section_ring, weighted_norm, longest_period
+   use spurflex_steady_outcome, only: steady_motion, status_missing, status_settled, status_not_settled, status_diverged, &
+      motion_unresolved, motion_quasi_periodic, motion_chaotic, motion_of_periods, longest_named
+   use spurflex_steady_sections, only: weighted_norm, longest_period
    use spurflex_steady_shooting, only: periodic_orbit, contact_is_kept
-   use spurflex_steady_stability, only: find_stable_orbit
+   use spurflex_steady_stability, only: find_stable_orbits, largest_multiplier
+   use spurflex_steady_transient, only: transient_type, begin_transient, watch_from_now, advance_transients, drifts
    implicit none
    private
 
-   public :: find_steady_motion
+   public :: find_steady_motion, find_steady_motions, describe_orbit
 
    !> Mesh periods after which the transient is first searched, if the start itself is no good; doubled each time.
    integer, parameter :: first_look = 12
 
-   !> Mesh periods from which on the growth of a tangent is summed: the transient has taken its own direction by then.
-   integer, parameter :: exponent_from = 64
+   !> Distance between sections, beside the size of the motion, at which a motion of many mesh periods is looked for.
+   real(wp), parameter :: long_recurrence = 0.005_wp
+
+   !> Mesh periods after which a transient is looked at again that should settle on a motion that keeps contact.
+   integer, parameter :: glance = 2
 
    !> Periods of the motion over which the transient must follow the linearised map.
    integer, parameter :: confirmations = 3
@@ -48,36 +52,12 @@ module spurflex_steady_search
    !> Mesh periods over which a motion that is called quasi-periodic must have been watched.
    integer, parameter :: fewest_periods = 512
 
-   !> Relative difference of the ranges of two halves of a motion that has arrived.
-   real(wp), parameter :: same_range = 0.05_wp
-
-   !> A state of this norm has left every physical range; far below overflow [m].
-   real(wp), parameter :: diverged_norm = 1.0e100_wp
-
-   !> A transient under way.
-   type :: transient_type
-      !> State at the latest section, tangent, shape (1, size).
-      real(wp), allocatable :: state(:), tangent(:, :)
-      !> Latest sections.
-      type(section_ring) :: ring
-      !> Growth of the tangent.
-      type(lyapunov_sum) :: growth
-      !> Mesh periods integrated.
-      integer :: periods = 0
-      !> The state is finite.
-      logical :: sound = .true.
-      !> Norms of the sections while the growth is summed: extremes over the first and the second half [m].
-      real(wp) :: low(2) = huge(1.0_wp), high(2) = -huge(1.0_wp)
-      !> Mesh period at which the second half begins.
-      integer :: half = 0
-   end type transient_type
-
 contains
 
-   !> Find the steady motion that a start leads to.
+   !> Find the steady motion that a start leads to at one point.
    subroutine find_steady_motion(map, start, options, visitor, motion)
       !> Period map at an operating point.
-      class(period_map), intent(inout) :: map
+      class(period_map), intent(inout), target :: map
       !> State at the first section, shape (size).
       real(wp), intent(in) :: start(:)
       !> Most periods.
@@ -87,157 +67,239 @@ contains
       !> The motion.
       type(steady_motion), intent(out) :: motion
 
-      type(transient_type) :: transient
-      integer :: next_look, spent
-      logical :: found
+      type(solo_ensemble) :: solo
+      type(steady_motion) :: motions(1)
+      type(periodic_orbit) :: orbits(1)
 
-      transient%state = start
-      allocate (transient%tangent(1, size(start)), source=1.0_wp)
-      transient%tangent = transient%tangent/weighted_norm(map%weight, transient%tangent(1, :))
-      call transient%ring%reset(map%weight)
-      call transient%ring%add(start)
-      next_look = first_look
-      spent = 0
-      do
-         call look_for_orbit(map, transient, options, visitor, spent, motion, found)
-         if (found .or. .not. transient%sound .or. transient%periods >= options%max_periods) exit
-         ! The exponent is that of the latest half or more: what came before was still on its way.
-         if (next_look <= options%max_periods) then
-            call transient%growth%reset()
-            transient%low = huge(1.0_wp)
-            transient%high = -huge(1.0_wp)
-            transient%half = (transient%periods + min(2*next_look - 1, options%max_periods))/2
-         end if
-         call advance_transient(map, transient, min(next_look, options%max_periods), visitor)
-         if (.not. transient%sound) exit
-         next_look = 2*next_look
-      end do
-      motion%periods_integrated = transient%periods + spent
-      if (found) return
-      motion%state = transient%state
-      if (transient%sound) then
-         call classify(transient, motion)
-      else
-         motion%status = status_diverged
-         motion%motion = motion_unresolved
-      end if
+      call new_solo(map, solo)
+      call find_steady_motions(solo, reshape(start, [size(start), 1]), options, visitor, motions, orbits)
+      motion = motions(1)
    end subroutine find_steady_motion
 
-   !> Integrate the transient up to some period.
-   subroutine advance_transient(map, transient, until, visitor)
-      !> Period map at an operating point.
-      class(period_map), intent(inout) :: map
-      !> The transient.
-      type(transient_type), intent(inout) :: transient
-      !> Mesh periods in all.
-      integer, intent(in) :: until
-      !> Let in between the periods.
-      class(attendant), intent(inout) :: visitor
-
-      real(wp) :: norm
-      integer :: which
-
-      do while (transient%periods < until)
-         if (transient%periods < exponent_from) then
-            call map%advance(transient%state)
-         else
-            call map%advance(transient%state, transient%tangent)
-            call transient%growth%add(map%weight, transient%tangent(1, :))
-         end if
-         call transient%ring%add(transient%state)
-         transient%periods = transient%periods + 1
-         norm = weighted_norm(map%weight, transient%state)
-         transient%sound = norm < diverged_norm
-         which = merge(1, 2, transient%periods <= transient%half)
-         transient%low(which) = min(transient%low(which), norm)
-         transient%high(which) = max(transient%high(which), norm)
-         if (.not. transient%sound) return
-         call visitor%attend()
-      end do
-   end subroutine advance_transient
-
-   !> Look for a stable periodic motion that the transient approaches.
-   subroutine look_for_orbit(map, transient, options, visitor, spent, motion, found)
-      !> Period map at an operating point.
-      class(period_map), intent(inout) :: map
-      !> The transient; goes on while it is compared.
-      type(transient_type), intent(inout) :: transient
+   !> Find the steady motions that starts lead to at several points.
+   subroutine find_steady_motions(points, starts, options, visitor, motions, orbits)
+      !> The points.
+      class(ensemble), intent(inout) :: points
+      !> State of each point at the first section, shape (size, points).
+      real(wp), intent(in) :: starts(:, :)
       !> Most periods.
       type(solver_options), intent(in) :: options
       !> Let in between the periods.
       class(attendant), intent(inout) :: visitor
-      !> Mesh periods spent on Newton's method, counted up.
-      integer, intent(inout) :: spent
-      !> The motion, if there is one.
+      !> The motions, shape (points).
+      type(steady_motion), intent(out) :: motions(:)
+      !> The orbits of those that are periodic, shape (points).
+      type(periodic_orbit), intent(out) :: orbits(:)
+
+      type(transient_type) :: transients(size(motions))
+      integer :: next_look, i
+      integer, allocatable :: left(:)
+      logical :: is_last
+
+      do i = 1, size(motions)
+         call begin_transient(points%weight(:, i), starts(:, i), transients(i))
+      end do
+      left = [(i, i=1, size(motions))]
+      next_look = first_look
+      do
+         call look_for_orbits(points, left, options, visitor, transients, motions, orbits)
+         left = pack(left, motions(left)%status == status_missing .and. transients(left)%sound &
+                     .and. transients(left)%periods < options%max_periods)
+         if (size(left) == 0) exit
+         if (next_look <= options%max_periods) then
+            ! Only the last watch decides on the class; in the one before it a tangent takes its own direction.
+            is_last = 2*next_look > options%max_periods
+            do i = 1, size(left)
+               call watch_from_now(transients(left(i)), merge(options%max_periods, next_look, is_last), &
+                                   grows=4*next_look > options%max_periods)
+            end do
+         end if
+         call advance_transients(points, left, spread(min(next_look, options%max_periods), 1, size(left)), transients, visitor)
+         next_look = 2*next_look
+      end do
+      do i = 1, size(motions)
+         motions(i)%periods_integrated = motions(i)%periods_integrated + transients(i)%periods
+         if (motions(i)%periods > 0) cycle
+         motions(i)%state = transients(i)%state
+         if (transients(i)%sound .and. motions(i)%status == status_missing) call classify(transients(i), motions(i))
+         if (motions(i)%status /= status_missing) cycle
+         motions(i)%motion = motion_unresolved
+         motions(i)%status = merge(status_not_settled, status_diverged, transients(i)%sound)
+      end do
+   end subroutine find_steady_motions
+
+   !> Look for stable periodic motions that the transients approach.
+   subroutine look_for_orbits(points, members, options, visitor, transients, motions, orbits)
+      !> The points.
+      class(ensemble), intent(inout) :: points
+      !> Which of them, shape (n).
+      integer, intent(in) :: members(:)
+      !> Most periods.
+      type(solver_options), intent(in) :: options
+      !> Let in between the periods.
+      class(attendant), intent(inout) :: visitor
+      !> The transients, shape (points); they go on while they are compared.
+      type(transient_type), intent(inout) :: transients(:)
+      !> The motions that are found, shape (points).
+      type(steady_motion), intent(inout) :: motions(:)
+      !> Their orbits, shape (points).
+      type(periodic_orbit), intent(inout) :: orbits(:)
+
+      type(periodic_orbit) :: near(size(members))
+      integer, allocatable :: sound(:)
+      real(wp) :: scale(size(members)), distance
+      logical :: found(size(members)), promising(size(members))
+      integer :: i, p
+
+      sound = pack(members, transients(members)%sound)
+      promising = .true.
+      do i = 1, size(sound)
+         p = sound(i)
+         near(i)%state = transients(p)%state
+         call transients(p)%ring%nearest(near(i)%periods, distance)
+         scale(i) = max(transients(p)%ring%scale(), abs(points%half_backlash))
+         promising(i) = near(i)%periods <= longest_named .or. distance <= long_recurrence*scale(i)
+      end do
+      near(:count(promising(:size(sound)))) = pack(near(:size(sound)), promising(:size(sound)))
+      scale(:count(promising(:size(sound)))) = pack(scale(:size(sound)), promising(:size(sound)))
+      sound = pack(sound, promising(:size(sound)))
+      associate (n => size(sound))
+         if (n == 0) return
+         call find_stable_orbits(points, sound, scale(:n), visitor, near(:n), found(:n), &
+                                 only_affine=all(transients(sound)%periods == 0), roughly=.not. options%multipliers)
+         do i = 1, n
+            motions(sound(i))%periods_integrated = motions(sound(i))%periods_integrated + near(i)%integrated
+         end do
+         call confirm_approach(points, sound, near(:n), options, visitor, transients, found(:n))
+         do i = 1, n
+            if (.not. found(i)) cycle
+            call describe_orbit(near(i), options, motions(sound(i)))
+            orbits(sound(i)) = near(i)
+         end do
+      end associate
+   end subroutine look_for_orbits
+
+   !> The motion on a stable orbit.
+   subroutine describe_orbit(orbit, options, motion)
+      !> The orbit.
+      type(periodic_orbit), intent(in) :: orbit
+      !> Whether its multipliers are asked for.
+      type(solver_options), intent(in) :: options
+      !> The motion.
       type(steady_motion), intent(inout) :: motion
-      !> There is one.
-      logical, intent(out) :: found
 
-      type(periodic_orbit) :: orbit
-      real(wp) :: distance, magnitude
-      integer :: n
-
-      call transient%ring%nearest(n, distance)
-      call find_stable_orbit(map, transient%state, n, max(transient%ring%scale(), abs(map%half_backlash)), visitor, orbit, &
-                             magnitude, spent, found, only_affine=transient%periods == 0)
-      if (.not. found) return
-      call approaches(map, orbit, transient, options, visitor, found)
-      if (.not. found) return
       motion%status = status_settled
       motion%periods = orbit%periods
       motion%motion = motion_of_periods(orbit%periods)
-      motion%floquet_magnitude = magnitude
+      motion%state = orbit%state
+      if (.not. options%multipliers) return
+      motion%floquet_magnitude = largest_multiplier(orbit)
       motion%lyapunov_exponent = log(max(motion%floquet_magnitude, tiny(1.0_wp)))/real(orbit%periods, wp)
       motion%lyapunov_error = 0.0_wp
-      motion%state = orbit%state
-   end subroutine look_for_orbit
+   end subroutine describe_orbit
 
-   !> The transient is on its way to a stable motion.
-   subroutine approaches(map, orbit, transient, options, visitor, it_does)
-      !> Period map at an operating point.
-      class(period_map), intent(inout) :: map
-      !> The motion.
-      type(periodic_orbit), intent(in) :: orbit
-      !> The transient; goes on meanwhile.
-      type(transient_type), intent(inout) :: transient
+   !> Keep the orbits that the transients are on their way to.
+   subroutine confirm_approach(points, members, orbits, options, visitor, transients, found)
+      !> The points.
+      class(ensemble), intent(inout) :: points
+      !> Which of them, shape (n).
+      integer, intent(in) :: members(:)
+      !> The orbits, shape (n).
+      type(periodic_orbit), intent(in) :: orbits(:)
       !> Most periods.
       type(solver_options), intent(in) :: options
       !> Let in between the periods.
       class(attendant), intent(inout) :: visitor
-      !> It is.
-      logical, intent(out) :: it_does
+      !> The transients, shape (points); they go on meanwhile.
+      type(transient_type), intent(inout) :: transients(:)
+      !> There is a stable orbit before; the transient approaches it after, shape (n).
+      logical, intent(inout) :: found(:)
 
-      real(wp), dimension(size(orbit%state)) :: away, predicted
-      real(wp) :: size_of_motion, miss, clearance
-      integer :: k
+      real(wp) :: predicted(points%size, size(members)), away(points%size)
+      integer, allocatable :: open(:)
+      logical :: arrives(size(members))
+      integer :: k, i
 
-      size_of_motion = max(weighted_norm(map%weight, orbit%state), 0.0_wp)
-      away = transient%state - orbit%state
-      if (contact_is_kept(map, orbit)) then
-         clearance = merge(orbit%smallest - map%half_backlash, -map%half_backlash - orbit%largest, orbit%smallest > 0.0_wp)
-         it_does = map%deflection_bound(away) <= safe_share*clearance
-         if (it_does .or. .not. map%half_backlash > 0.0_wp) then
-            it_does = .true.
-            return
-         end if
+      open = pack([(i, i=1, size(members))], found)
+      if (all(transients(members)%periods == 0)) then
+         ! Nothing has moved yet: a start near enough, or a transient that comes near enough soon.
+         do k = 0, first_look/glance
+            if (k > 0) call advance_transients(points, members(open), transients(members(open))%periods + glance, transients, &
+                                               visitor)
+            do i = 1, size(open)
+               associate (p => members(open(i)), orbit => orbits(open(i)))
+                  found(open(i)) = is_there(points, p, orbit, transients(p)%state - orbit%state)
+               end associate
+            end do
+            open = pack(open, .not. found(open))
+         end do
+         return
       end if
-      it_does = weighted_norm(map%weight, away) <= arrived*size_of_motion
-      if (it_does .or. transient%periods == 0) return
-      do k = 1, confirmations
-         predicted = matmul(orbit%monodromy, away)
-         call advance_transient(map, transient, transient%periods + orbit%periods, visitor)
-         if (.not. transient%sound) return
-         away = transient%state - orbit%state
-         miss = weighted_norm(map%weight, away - predicted)
-         if (miss > arrived*size_of_motion) then
-            if (miss > follows_distance*weighted_norm(map%weight, away) .or. miss > follows_size*size_of_motion) return
-         end if
-         if (transient%periods > options%max_periods + confirmations*longest_period) return
+      do i = 1, size(open)
+         associate (p => members(open(i)), orbit => orbits(open(i)))
+            arrives(i) = is_there(points, p, orbit, transients(p)%state - orbit%state)
+         end associate
       end do
-      it_does = .true.
-   end subroutine approaches
+      open = pack(open, .not. arrives(:size(open)))
+      do k = 1, confirmations
+         open = pack(open, found(open))
+         do i = 1, size(open)
+            predicted(:, i) = matmul(orbits(open(i))%monodromy, transients(members(open(i)))%state - orbits(open(i))%state)
+         end do
+         call advance_transients(points, members(open), transients(members(open))%periods + orbits(open)%periods, transients, &
+                                 visitor)
+         do i = 1, size(open)
+            associate (transient => transients(members(open(i))), orbit => orbits(open(i)))
+               found(open(i)) = transient%sound .and. transient%periods <= options%max_periods + confirmations*longest_period
+               if (.not. found(open(i))) cycle
+               away = transient%state - orbit%state
+               found(open(i)) = follows(points%weight(:, members(open(i))), orbit, away, away - predicted(:, i))
+            end associate
+         end do
+      end do
+   end subroutine confirm_approach
 
-   !> The class of a motion in which nothing periodic was found.
+   !> A transient surely ends on an orbit: it is there, or contact is kept and cannot be lost any more.
+   pure function is_there(points, member, orbit, away) result(it_is)
+      !> The points.
+      class(ensemble), intent(in) :: points
+      !> Which of them.
+      integer, intent(in) :: member
+      !> The orbit.
+      type(periodic_orbit), intent(in) :: orbit
+      !> Distance of the transient, shape (size).
+      real(wp), intent(in) :: away(:)
+      !> It does.
+      logical :: it_is
+
+      real(wp) :: clearance
+
+      it_is = weighted_norm(points%weight(:, member), away) <= arrived*weighted_norm(points%weight(:, member), orbit%state)
+      if (it_is .or. .not. contact_is_kept(points%half_backlash, orbit)) return
+      clearance = merge(orbit%smallest - points%half_backlash, -points%half_backlash - orbit%largest, orbit%smallest > 0.0_wp)
+      it_is = points%deflection_bound(away) <= safe_share*clearance .or. .not. points%half_backlash > 0.0_wp
+   end function is_there
+
+   !> A transient follows the linearised map.
+   pure function follows(weight, orbit, away, miss) result(it_does)
+      !> Weights of the states, shape (size).
+      real(wp), intent(in) :: weight(:)
+      !> The orbit.
+      type(periodic_orbit), intent(in) :: orbit
+      !> Distance of the transient, and by how much the linearised map misses it, shape (size).
+      real(wp), intent(in) :: away(:), miss(:)
+      !> It does.
+      logical :: it_does
+
+      real(wp) :: size_of_motion, size_of_miss
+
+      size_of_motion = weighted_norm(weight, orbit%state)
+      size_of_miss = weighted_norm(weight, miss)
+      it_does = size_of_miss <= arrived*size_of_motion .or. &
+                (size_of_miss <= follows_distance*weighted_norm(weight, away) .and. size_of_miss <= follows_size*size_of_motion)
+   end function follows
+
+   !> The class of a motion in which nothing periodic was found; its status remains `status_missing` where it cannot be told.
    pure subroutine classify(transient, motion)
       !> The transient.
       type(transient_type), intent(in) :: transient
@@ -255,22 +317,8 @@ contains
       else if (wander <= neutral_growth .and. periods >= fewest_periods .and. .not. drifts(transient)) then
          motion%motion = motion_quasi_periodic
       else
-         motion%motion = motion_unresolved
-         motion%status = status_not_settled
+         motion%status = status_missing
       end if
    end subroutine classify
-
-   !> A motion is still on its way: its sections range over more, or less, in the second half than in the first.
-   pure function drifts(transient) result(it_does)
-      !> The transient.
-      type(transient_type), intent(in) :: transient
-      !> It is.
-      logical :: it_does
-
-      real(wp) :: range(2)
-
-      range = max(transient%high - transient%low, 0.0_wp)
-      it_does = abs(range(2) - range(1)) > same_range*maxval(range)
-   end function drifts
 
 end module spurflex_steady_search

@@ -117,7 +117,8 @@ contains
       !> Euclidean norm of the weighted components.
       real(wp) :: norm
 
-      norm = norm2(weight*state)
+      ! Displacements are far from where squares overflow; what has diverged is infinite, and may be so.
+      norm = sqrt(sum((weight*state)**2))
    end function weighted_norm
 
 end module spurflex_steady_sections

@@ -3,85 +3,128 @@ module spurflex_steady_stability
    use spurflex_base_attendant, only: attendant
    use spurflex_base_error, only: error_type
    use spurflex_base_kinds, only: wp
-   use spurflex_integrate_period_map, only: period_map
+   use spurflex_integrate_ensemble, only: ensemble
+   use spurflex_steady_batch, only: batch, contracting
    use spurflex_steady_sections, only: weighted_norm
-   use spurflex_steady_shooting, only: periodic_orbit, find_orbit, floquet_multipliers
+   use spurflex_steady_shooting, only: periodic_orbit, find_orbits, floquet_multipliers
    implicit none
    private
 
-   public :: find_stable_orbit
+   public :: find_stable_orbits, largest_multiplier
 
    !> Distance of the sections of a motion, beside its size, that is none.
    real(wp), parameter :: same_section = 1.0e-6_wp
 
 contains
 
-   !> Find a stable periodic motion near a state.
-   subroutine find_stable_orbit(map, start, periods, scale, visitor, orbit, magnitude, spent, found, only_affine)
-      !> Period map at an operating point.
-      class(period_map), intent(inout) :: map
-      !> State near the motion, shape (size).
-      real(wp), intent(in) :: start(:)
-      !> Mesh periods after which the motion repeats; it may repeat sooner.
-      integer, intent(in) :: periods
-      !> Size of the motion [m].
-      real(wp), intent(in) :: scale
-      !> Let in between the iterations.
+   !> Find stable periodic motions of several points, each near a state.
+   subroutine find_stable_orbits(points, members, scale, visitor, orbits, found, only_affine, roughly)
+      !> The points.
+      class(ensemble), intent(inout) :: points
+      !> Which of them, shape (n).
+      integer, intent(in) :: members(:)
+      !> Size of each motion, shape (n) [m].
+      real(wp), intent(in) :: scale(:)
+      !> Let in between the periods.
       class(attendant), intent(inout) :: visitor
-      !> The motion, with its shortest period.
-      type(periodic_orbit), intent(out) :: orbit
-      !> Largest modulus of its Floquet multipliers.
-      real(wp), intent(out) :: magnitude
-      !> Mesh periods integrated, counted up.
-      integer, intent(inout) :: spent
-      !> There is one, and it is stable.
-      logical, intent(out) :: found
+      !> A state near the motion and its period, which may be a multiple of the shortest, before; the motion with its shortest
+      !> period after, shape (n).
+      type(periodic_orbit), intent(inout) :: orbits(:)
+      !> There is one, and it is stable, shape (n).
+      logical, intent(out) :: found(:)
       !> Give up at once where contact is lost.
       logical, intent(in), optional :: only_affine
+      !> The monodromy may be that of a state nearby.
+      logical, intent(in), optional :: roughly
+
+      call find_orbits(points, members, scale, visitor, orbits, found, only_affine, roughly=roughly)
+      call reduce_periods(points, members, found, visitor, orbits)
+      call keep_stable(orbits, found)
+   end subroutine find_stable_orbits
+
+   !> Take the shortest period of motions that were found with a multiple of it.
+   subroutine reduce_periods(points, members, found, visitor, orbits)
+      !> The points.
+      class(ensemble), intent(inout) :: points
+      !> Which of them, shape (n).
+      integer, intent(in) :: members(:)
+      !> There is a motion, shape (n).
+      logical, intent(in) :: found(:)
+      !> Let in between the periods.
+      class(attendant), intent(inout) :: visitor
+      !> The motions, shape (n).
+      type(periodic_orbit), intent(inout) :: orbits(:)
+
+      type(periodic_orbit) :: shorter(1)
+      real(wp) :: states(points%seats, points%size), size_of_motion
+      integer :: i, k
+      logical :: is_shorter(1)
+
+      states = 0.0_wp
+      do i = 1, size(orbits)
+         if (.not. found(i) .or. orbits(i)%periods == 1) cycle
+         size_of_motion = max(weighted_norm(points%weight(:, members(i)), orbits(i)%state), points%half_backlash)
+         call points%seat(1, members(i))
+         states(1, :) = orbits(i)%state
+         do k = 1, orbits(i)%periods/2
+            call points%advance(states)
+            orbits(i)%integrated = orbits(i)%integrated + 1
+            if (mod(orbits(i)%periods, k) /= 0) cycle
+            if (weighted_norm(points%weight(:, members(i)), states(1, :) - orbits(i)%state) > same_section*size_of_motion) cycle
+            shorter(1) = orbits(i)
+            shorter(1)%periods = k
+            call find_orbits(points, members(i:i), [size_of_motion], visitor, shorter, is_shorter)
+            orbits(i)%integrated = orbits(i)%integrated + shorter(1)%integrated
+            if (is_shorter(1)) then
+               shorter(1)%integrated = orbits(i)%integrated
+               orbits(i) = shorter(1)
+               exit
+            end if
+            call points%seat(1, members(i))
+         end do
+      end do
+   end subroutine reduce_periods
+
+   !> Keep the orbits whose multipliers all lie inside the unit circle.
+   subroutine keep_stable(orbits, found)
+      !> The orbits, shape (n).
+      type(periodic_orbit), intent(in) :: orbits(:)
+      !> There is one before; it is stable after, shape (n).
+      logical, intent(inout) :: found(:)
+
+      real(wp), allocatable :: matrices(:, :, :)
+      logical :: stable(batch)
+      integer, allocatable :: members(:)
+      integer :: first, i, k, n
+
+      members = pack([(i, i=1, size(orbits))], found)
+      do first = 1, size(members), batch
+         n = size(orbits(members(first))%state)
+         if (.not. allocated(matrices)) allocate (matrices(batch, n, n))
+         matrices = 0.0_wp
+         do k = 1, min(batch, size(members) - first + 1)
+            matrices(k, :, :) = orbits(members(first + k - 1))%monodromy
+         end do
+         call contracting(n, matrices, stable)
+         do k = 1, min(batch, size(members) - first + 1)
+            found(members(first + k - 1)) = stable(k)
+         end do
+      end do
+   end subroutine keep_stable
+
+   !> Largest modulus of the Floquet multipliers of a motion.
+   function largest_multiplier(orbit) result(magnitude)
+      !> The motion.
+      type(periodic_orbit), intent(in) :: orbit
+      !> The modulus; huge where the multipliers cannot be found.
+      real(wp) :: magnitude
 
       complex(wp), allocatable :: multipliers(:)
       type(error_type), allocatable :: error
 
-      magnitude = 0.0_wp
-      call find_orbit(map, start, periods, scale, visitor, orbit, found, only_affine)
-      spent = spent + orbit%integrated
-      if (.not. found) return
-      call reduce_period(map, visitor, spent, orbit)
       call floquet_multipliers(orbit%monodromy, multipliers, error)
-      found = .not. allocated(error)
-      if (.not. found) return
-      magnitude = maxval(abs(multipliers))
-      found = magnitude < 1.0_wp
-   end subroutine find_stable_orbit
-
-   !> Take the shortest period of a motion that was found with a multiple of it.
-   subroutine reduce_period(map, visitor, spent, orbit)
-      !> Period map at an operating point.
-      class(period_map), intent(inout) :: map
-      !> Let in between the periods.
-      class(attendant), intent(inout) :: visitor
-      !> Mesh periods spent on Newton's method, counted up.
-      integer, intent(inout) :: spent
-      !> The motion.
-      type(periodic_orbit), intent(inout) :: orbit
-
-      type(periodic_orbit) :: shorter
-      real(wp) :: moving(size(orbit%state)), scale
-      integer :: k
-      logical :: found
-
-      moving = orbit%state
-      scale = max(weighted_norm(map%weight, orbit%state), map%half_backlash)
-      do k = 1, orbit%periods/2
-         call map%advance(moving)
-         spent = spent + 1
-         if (mod(orbit%periods, k) /= 0) cycle
-         if (weighted_norm(map%weight, moving - orbit%state) > same_section*scale) cycle
-         call find_orbit(map, orbit%state, k, scale, visitor, shorter, found)
-         spent = spent + shorter%integrated
-         if (found) orbit = shorter
-         if (found) return
-      end do
-   end subroutine reduce_period
+      magnitude = huge(1.0_wp)
+      if (.not. allocated(error)) magnitude = maxval(abs(multipliers))
+   end function largest_multiplier
 
 end module spurflex_steady_stability

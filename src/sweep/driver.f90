@@ -115,7 +115,7 @@ contains
 
          integer :: finished(outcomes)
 
-         call log%begin(support//': '//to_text(sum(chunks%count))//' points on '//to_text(ranks)//' ranks')
+         call log%begin(support//': '//to_text(sum(chunks%rows*chunks%count))//' points on '//to_text(ranks)//' ranks')
          call work_on_chunks(case, chunks, comm, results, log, rigid_deformation, finished, error)
          if (allocated(error)) then
             error%alone = .true.
@@ -123,7 +123,7 @@ contains
          end if
          call mpi_bcast(finished, outcomes, MPI_INTEGER, 0, comm)
          total = total + finished
-         left = left + sum(chunks%count) - sum(finished)
+         left = left + sum(chunks%rows*chunks%count) - sum(finished)
       end subroutine work_through
 
    end subroutine run_case

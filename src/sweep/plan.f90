@@ -1,8 +1,9 @@
 !> What has to be computed: the points of the grid that are missing, cut into chunks that are handed to ranks.
 !>
-!> A chunk is a run of neighbouring speeds on one row of the grid, so that its results are written in one piece. Soft
-!> supports, whose transients are long, come first: a slow chunk at the end would leave the other ranks idle. With the
-!> starts 'up' and 'down' each point begins where its neighbour ended, and a chunk is a whole row.
+!> A chunk is a tile of neighbouring speeds and support stiffnesses, so that its results are written in one piece and dear
+!> points, which lie together, fill the lanes of the processor's vectors. Soft supports, whose transients are long, come first:
+!> a slow chunk at the end would leave the other ranks idle. With the starts 'up' and 'down' each point begins where its
+!> neighbour ended, and a chunk is some whole rows side by side.
 module spurflex_sweep_plan
    use spurflex_base_kinds, only: i8
    use spurflex_base_text, only: to_text
@@ -16,15 +17,18 @@ module spurflex_sweep_plan
    public :: chunk_type, plan_row, plan_grid, is_chained, describe_plan
 
    !> Points handed out at once at most: few enough to balance, enough to write in one go.
-   integer, parameter :: largest_chunk = 32
+   integer, parameter :: largest_chunk = 128
 
    !> Chunks that each rank should get at least, where there are enough points.
-   integer, parameter :: chunks_per_rank = 16
+   integer, parameter :: chunks_per_rank = 24
 
-   !> Neighbouring speeds of one row.
+   !> Points that a rank solves side by side: fewer in a chunk leave lanes empty.
+   integer, parameter :: smallest_chunk = 8
+
+   !> Neighbouring speeds of some neighbouring rows.
    type :: chunk_type
-      !> Index of the support stiffness, 0 for the rigid support.
-      integer :: row = 0
+      !> Index of the first support stiffness, 0 for the rigid support, and number of them.
+      integer :: row = 0, rows = 1
       !> Index of the first speed.
       integer :: first = 1
       !> Number of speeds.
@@ -84,31 +88,70 @@ contains
       type(chunk_type), allocatable :: chunks(:)
 
       type(chunk_type), allocatable :: found(:)
-      integer :: length, n, row, speed
+      integer :: missing, length, height, width, n, first, rows, row, speed
 
-      length = max(1, min(largest_chunk, count(status == status_missing)/(ranks*chunks_per_rank)))
+      missing = count(status == status_missing)
+      length = max(1, min(smallest_chunk, missing/ranks), min(largest_chunk, missing/(ranks*chunks_per_rank)))
+      height = max(1, min(nint(sqrt(real(length))), size(status, 2)))
+      width = length/height
+      if (is_chained(case)) then
+         height = max(1, min(smallest_chunk, size(status, 2)/ranks))
+         width = size(status, 1)
+      end if
       allocate (found(size(status)))
       n = 0
-      do row = 1, size(status, 2)
-         if (is_chained(case)) then
-            if (all(status(:, row) /= status_missing)) cycle
-            n = n + 1
-            found(n) = chunk_type(row, 1, size(status, 1))
-         else
-            speed = 1
-            do while (speed <= size(status, 1))
-               if (status(speed, row) == status_missing) then
+      do first = 1, size(status, 2), height
+         rows = min(height, size(status, 2) - first + 1)
+         do speed = 1, size(status, 1), width
+            associate (tile => status(speed:min(speed + width - 1, size(status, 1)), first:first + rows - 1))
+               if (all(tile == status_missing)) then
                   n = n + 1
-                  found(n) = chunk_type(row, speed, missing_run(status(speed:, row), length))
-                  speed = speed + found(n)%count
+                  found(n) = chunk_type(row=first, rows=rows, first=speed, count=size(tile, 1))
                else
-                  speed = speed + 1
+                  do row = 1, rows
+                     call add_runs(tile(:, row), is_chained(case), chunk_type(row=first + row - 1, first=speed), found, n)
+                  end do
                end if
-            end do
-         end if
+            end associate
+         end do
       end do
       chunks = found(:n)
    end function cut_rows
+
+   !> Add what is missing of one row of a tile, run by run; a chained row as a whole.
+   pure subroutine add_runs(status, as_a_whole, begin, chunks, n)
+      !> Status of neighbouring points of one row.
+      integer, intent(in) :: status(:)
+      !> The row cannot be cut.
+      logical, intent(in) :: as_a_whole
+      !> Row, and index of its first point.
+      type(chunk_type), intent(in) :: begin
+      !> The chunks.
+      type(chunk_type), intent(inout) :: chunks(:)
+      !> How many there are.
+      integer, intent(inout) :: n
+
+      integer :: i
+
+      if (as_a_whole .and. any(status == status_missing)) then
+         n = n + 1
+         chunks(n) = begin
+         chunks(n)%count = size(status)
+         return
+      end if
+      i = 1
+      do while (i <= size(status))
+         if (status(i) == status_missing) then
+            n = n + 1
+            chunks(n) = begin
+            chunks(n)%first = begin%first + i - 1
+            chunks(n)%count = missing_run(status(i:), size(status))
+            i = i + chunks(n)%count
+         else
+            i = i + 1
+         end if
+      end do
+   end subroutine add_runs
 
    !> How many points from the first on are missing.
    pure function missing_run(status, most) result(length)

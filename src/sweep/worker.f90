@@ -1,14 +1,14 @@
-!> One rank's work: take a chunk, solve its points one after the other, write it, take the next.
+!> One rank's work: take a chunk, solve its points, write it, take the next.
 module spurflex_sweep_worker
    use mpi_f08, only: MPI_Comm
    use spurflex_base_error, only: error_type
    use spurflex_base_kinds, only: wp, i8
-   use spurflex_integrate_options, only: start_rest, start_down
+   use spurflex_integrate_options, only: solver_options, start_rest, start_down
    use spurflex_io_axes, only: speeds, stiffnesses
    use spurflex_io_case, only: case_type
    use spurflex_io_log, only: logger
    use spurflex_io_results, only: results_file, write_rigid, write_flexible
-   use spurflex_measure_point, only: point_solver, new_point_solver, respond
+   use spurflex_measure_points, only: solver_type, new_solver, respond
    use spurflex_measure_response, only: response, nan, status_diverged
    use spurflex_model_equations, only: equations_type, new_equations, rest_deviation
    use spurflex_model_parameters, only: operating_point, support_rigid, support_flexible
@@ -46,19 +46,22 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       type(sweep_attendant) :: visitor
-      type(point_solver) :: solver
+      type(solver_type) :: solver
+      type(solver_options) :: options
       type(response), allocatable :: responses(:)
       integer :: number, i
       logical :: available
 
       visitor%log => log
-      visitor%points = sum(int(chunks%count, i8))
+      visitor%points = sum(int(chunks%rows, i8)*chunks%count)
       call new_scheduler(visitor%schedule, comm, size(chunks))
-      call new_point_solver(case%solver, solver)
+      options = case%solver
+      options%multipliers = any(case%output%products == 'floquet' .or. case%output%products == 'lyapunov')
+      call new_solver(options, solver)
       do
          call visitor%schedule%take(number, available)
          if (.not. available) exit
-         allocate (responses(chunks(number)%count))
+         allocate (responses(chunks(number)%rows*chunks(number)%count))
          call solve_chunk(case, chunks(number), solver, visitor, responses)
          call write_chunk(chunks(number), responses, results, rigid_deformation, error)
          if (allocated(error)) return
@@ -78,32 +81,71 @@ contains
       !> The chunk.
       type(chunk_type), intent(in) :: chunk
       !> Solver.
-      type(point_solver), intent(inout) :: solver
+      type(solver_type), intent(inout) :: solver
       !> Let in now and then.
       type(sweep_attendant), intent(inout) :: visitor
-      !> Responses in the order of the speeds, shape (count).
+      !> Responses at the speeds of one row after the other, shape (count rows).
       type(response), intent(out) :: responses(:)
 
-      type(equations_type) :: equations
+      type(equations_type) :: equations(size(responses))
       type(operating_point) :: point
-      real(wp), allocatable :: position(:), velocity(:), speed(:), stiffness(:)
-      integer :: i, k
-      logical :: continues
+      real(wp), allocatable :: positions(:, :), velocities(:, :), speed(:), stiffness(:)
+      integer :: i, row, p
 
       speed = speeds(case%sweep)
       stiffness = stiffnesses(case%sweep)
-      continues = .false.
       point%support = merge(support_flexible, support_rigid, chunk%row > 0)
-      if (chunk%row > 0) point%support_stiffness = stiffness(chunk%row)
-      do k = 1, chunk%count
-         i = merge(chunk%count + 1 - k, k, case%solver%start == start_down)
-         point%speed = speed(chunk%first + i - 1)
-         equations = new_equations(case%gears, case%box, case%load, point)
-         if (.not. continues) call set_start(case, equations, position, velocity)
-         call respond(solver, equations, position, velocity, visitor, responses(i))
-         continues = is_chained(case) .and. responses(i)%status /= status_diverged
+      do row = 1, chunk%rows
+         if (chunk%row > 0) point%support_stiffness = stiffness(chunk%row + row - 1)
+         do i = 1, chunk%count
+            point%speed = speed(chunk%first + i - 1)
+            equations((row - 1)*chunk%count + i) = new_equations(case%gears, case%box, case%load, point)
+         end do
       end do
+      allocate (positions(equations(1)%n, size(responses)), velocities(equations(1)%n, size(responses)))
+      do p = 1, size(responses)
+         call set_start(case, equations(p), positions(:, p), velocities(:, p))
+      end do
+      if (is_chained(case)) then
+         call solve_chain(chunk, case%solver%start == start_down, solver, equations, positions, velocities, visitor, responses)
+      else
+         call respond(solver, equations, positions, velocities, visitor, responses)
+      end if
    end subroutine solve_chunk
+
+   !> Solve rows side by side, each point from where its neighbour ended.
+   subroutine solve_chain(chunk, is_down, solver, equations, positions, velocities, visitor, responses)
+      !> The chunk.
+      type(chunk_type), intent(in) :: chunk
+      !> From the highest speed down.
+      logical, intent(in) :: is_down
+      !> Solver.
+      type(solver_type), intent(inout) :: solver
+      !> Equations of motion of each point, shape (count rows).
+      type(equations_type), intent(in) :: equations(:)
+      !> Starts of those points that continue no other, shape (n, count rows); overwritten.
+      real(wp), intent(inout) :: positions(:, :), velocities(:, :)
+      !> Let in now and then.
+      type(sweep_attendant), intent(inout) :: visitor
+      !> Responses, shape (count rows).
+      type(response), intent(inout) :: responses(:)
+
+      real(wp), dimension(size(positions, 1), chunk%rows) :: position, velocity
+      type(response) :: column(chunk%rows)
+      integer :: here(chunk%rows), i, k, row
+
+      do k = 1, chunk%count
+         i = merge(chunk%count + 1 - k, k, is_down)
+         here = [((row - 1)*chunk%count + i, row=1, chunk%rows)]
+         do row = 1, chunk%rows
+            if (k > 1 .and. column(row)%status /= status_diverged) cycle
+            position(:, row) = positions(:, here(row))
+            velocity(:, row) = velocities(:, here(row))
+         end do
+         call respond(solver, equations(here), position, velocity, visitor, column)
+         responses(here) = column
+      end do
+   end subroutine solve_chain
 
    !> Where a point starts that continues no other: at rest, or in static equilibrium.
    pure subroutine set_start(case, equations, position, velocity)
@@ -112,11 +154,10 @@ contains
       !> Equations of motion of the point.
       type(equations_type), intent(in) :: equations
       !> Deviation from the static equilibrium and its rate, shape (n).
-      real(wp), allocatable, intent(inout) :: position(:), velocity(:)
+      real(wp), intent(out) :: position(:), velocity(:)
 
-      if (allocated(position)) deallocate (position)
-      if (allocated(velocity)) deallocate (velocity)
-      allocate (position(equations%n), velocity(equations%n), source=0.0_wp)
+      position = 0.0_wp
+      velocity = 0.0_wp
       if (case%solver%start == start_rest) position = rest_deviation(equations)
    end subroutine set_start
 
@@ -124,7 +165,7 @@ contains
    subroutine write_chunk(chunk, responses, results, rigid_deformation, error)
       !> The chunk.
       type(chunk_type), intent(in) :: chunk
-      !> Its responses, shape (count).
+      !> Its responses, shape (count rows).
       type(response), intent(in) :: responses(:)
       !> Open result file.
       type(results_file), intent(in) :: results
@@ -134,7 +175,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       real(wp) :: eta(3, size(responses)), rigid(2), ratio(2)
-      integer :: i
+      integer :: i, twin
 
       eta = nan()
       if (chunk%row == 0) then
@@ -147,14 +188,15 @@ contains
       end if
       if (allocated(rigid_deformation)) then
          do i = 1, size(responses)
-            rigid = rigid_deformation(:2, chunk%first + i - 1)
+            twin = chunk%first + mod(i - 1, chunk%count)
+            rigid = rigid_deformation(:2, twin)
             if (any(rigid >= no_twin) .or. any(rigid <= 0.0_wp) .or. responses(i)%status == status_diverged) cycle
             ratio = responses(i)%bearing_deformation_max/rigid
             eta(:2, i) = 100.0_wp*(ratio - 1.0_wp)
-            eta(3, i) = 100.0_wp*maxval(ratio)*(responses(i)%error_estimate + rigid_deformation(3, chunk%first + i - 1))
+            eta(3, i) = 100.0_wp*maxval(ratio)*(responses(i)%error_estimate + rigid_deformation(3, twin))
          end do
       end if
-      call write_flexible(results, chunk%row, chunk%first, responses, eta, error)
+      call write_flexible(results, chunk%row, chunk%rows, chunk%first, responses, eta, error)
    end subroutine write_chunk
 
 end module spurflex_sweep_worker

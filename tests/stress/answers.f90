@@ -8,7 +8,7 @@ module answers
    use spurflex_base_kinds, only: wp, pi
    use spurflex_base_text, only: to_text
    use spurflex_integrate_options, only: solver_options
-   use spurflex_measure_point, only: new_point_solver, point_solver, respond
+   use spurflex_measure_points, only: new_solver, solver_type, respond_one
    use spurflex_measure_response, only: response, status_diverged, status_missing, status_settled
    use spurflex_model_equations, only: equations_type
    use test_support, only: check, error_type
@@ -39,14 +39,14 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       real(wp), parameter :: longest = 60.0_wp
-      type(point_solver) :: solver
+      type(solver_type) :: solver
       type(no_attendant) :: nobody
       real(wp) :: begin, end
 
       allocate (position(equations%n), velocity(equations%n), source=0.0_wp)
       call cpu_time(begin)
-      call new_point_solver(options, solver)
-      call respond(solver, equations, position, velocity, nobody, answer)
+      call new_solver(options, solver)
+      call respond_one(solver, equations, position, velocity, nobody, answer)
       call cpu_time(end)
       call check(error, end - begin < longest, 'a point that takes more than a minute')
    end subroutine find_answer

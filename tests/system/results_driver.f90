@@ -162,9 +162,9 @@ contains
                cycle
             else if (case%sweep%rigid) then
                eta = reshape([(real([i, stiffness, 0], wp), i=first, last)], [3, last - first + 1])
-               call write_flexible(results, stiffness, first, responses, eta, error)
+               call write_flexible(results, stiffness, 1, first, responses, eta, error)
             else
-               call write_flexible(results, stiffness, first, responses, error=error)
+               call write_flexible(results, stiffness, 1, first, responses, error=error)
             end if
             call give_up_on(error)
          end do

@@ -12,7 +12,7 @@ module test_search
    use spurflex_integrate_options, only: integrator_collocation, integrator_newmark, solver_options
    use spurflex_integrate_period_map, only: orbit_type
    use spurflex_measure_motion, only: motion_measure
-   use spurflex_measure_point, only: new_point_solver, point_solver, respond
+   use spurflex_measure_points, only: new_solver, solver_type, respond_one
    use spurflex_measure_response, only: empty_response, motion_chaotic, &
       motion_quasi_periodic, response, status_settled
    use spurflex_model_equations, only: equations_type, new_equations, rest_deviation
@@ -57,12 +57,12 @@ contains
       !> The response.
       type(response), intent(out) :: answer
 
-      type(point_solver) :: solver
+      type(solver_type) :: solver
       type(no_attendant) :: nobody
 
       if (.not. allocated(position)) allocate (position(equations%n), velocity(equations%n), source=0.0_wp)
-      call new_point_solver(options, solver)
-      call respond(solver, equations, position, velocity, nobody, answer)
+      call new_solver(options, solver)
+      call respond_one(solver, equations, position, velocity, nobody, answer)
    end subroutine solve_point
 
    !> Amplitude of y1 over the last periods of a long run by Runge-Kutta.

@@ -1,0 +1,140 @@
+!> What a recorded period of the lanes looks like: displacements, rates and accelerations at the ends and in the
+!> middle of every step.
+module spurflex_integrate_lane_observe
+   use spurflex_base_kinds, only: wp, pi
+   use spurflex_integrate_lane_rule, only: lanes, most_modes, lane_record
+   use spurflex_integrate_period_map, only: orbit_type, observables, reserve_orbit
+   use spurflex_model_modal, only: modal_system
+   implicit none
+   private
+
+   public :: point_view, new_point_view, lane_view, seat_view, observe, take_orbit
+
+   !> Values, rates and accelerations.
+   integer, parameter :: orders = 3
+
+   !> How the displacements of a point follow from its modes.
+   type :: point_view
+      !> Value, rate and acceleration of each displacement are the real part of these times z, plus these times N, shapes
+      !> (most_modes, displacements, orders) and (displacements, orders).
+      real(wp), dimension(most_modes, observables, orders) :: re = 0.0_wp, im = 0.0_wp
+      real(wp) :: force(observables, orders) = 0.0_wp
+   end type point_view
+
+   !> The same of all seats, and what is seen.
+   type :: lane_view
+      private
+      real(wp), dimension(lanes, most_modes, observables, orders) :: re = 0.0_wp, im = 0.0_wp
+      real(wp) :: force(lanes, observables, orders) = 0.0_wp
+      !> Values, rates and accelerations, shape (lanes, displacements, orders, 0:2 steps).
+      real(wp), allocatable :: seen(:, :, :, :)
+   end type lane_view
+
+contains
+
+   !> How the displacements follow from the modes.
+   pure function new_point_view(modal) result(view)
+      !> Modes of the linear part.
+      type(modal_system), intent(in) :: modal
+      !> The view.
+      type(point_view) :: view
+
+      complex(wp) :: factor(modal%modes)
+      integer :: i, order
+
+      do i = 1, observables
+         factor = modal%observation(i, :)
+         do order = 1, orders
+            view%re(:modal%modes, i, order) = real(factor, wp)
+            view%im(:modal%modes, i, order) = aimag(factor)
+            ! The rate of N does not reach the acceleration of a position.
+            if (order < orders) view%force(i, order + 1) = -real(sum(factor*modal%influence), wp)
+            factor = factor*modal%rate
+         end do
+      end do
+   end function new_point_view
+
+   !> Put a point into a lane.
+   pure subroutine seat_view(self, lane, view)
+      !> View of all lanes.
+      type(lane_view), intent(inout) :: self
+      !> Lane.
+      integer, intent(in) :: lane
+      !> View of the point.
+      type(point_view), intent(in) :: view
+
+      self%re(lane, :, :, :) = view%re
+      self%im(lane, :, :, :) = view%im
+      self%force(lane, :, :) = view%force
+   end subroutine seat_view
+
+   !> Look at the latest period of all lanes.
+   subroutine observe(self, modes, record, steps)
+      !> View.
+      type(lane_view), intent(inout) :: self
+      !> Modes in use.
+      integer, intent(in) :: modes
+      !> The period.
+      type(lane_record), intent(in) :: record
+      !> Steps per mesh period.
+      integer, intent(in) :: steps
+
+      real(wp) :: value(lanes)
+      integer :: s, order, i, j, l
+
+      if (allocated(self%seen)) then
+         if (ubound(self%seen, 4) < 2*steps) deallocate (self%seen)
+      end if
+      if (.not. allocated(self%seen)) allocate (self%seen(lanes, observables, orders, 0:2*steps))
+      do s = 0, 2*steps, merge(1, 2, record%middles)
+         do order = 1, orders
+            do i = 1, observables
+               do l = 1, lanes
+                  value(l) = self%force(l, i, order)*record%force(l, s)
+               end do
+               do j = 1, modes
+                  do l = 1, lanes
+                     value(l) = value(l) + self%re(l, j, i, order)*record%re(l, j, s) - self%im(l, j, i, order)*record%im(l, j, s)
+                  end do
+               end do
+               do l = 1, lanes
+                  self%seen(l, i, order, s) = value(l)
+               end do
+            end do
+         end do
+      end do
+   end subroutine observe
+
+   !> The latest period of one lane.
+   subroutine take_orbit(self, lane, steps, middles, frequency, orbit)
+      !> View.
+      type(lane_view), intent(in) :: self
+      !> Lane.
+      integer, intent(in) :: lane
+      !> Steps per mesh period.
+      integer, intent(in) :: steps
+      !> The middles of the steps were recorded too.
+      logical, intent(in) :: middles
+      !> Mesh frequency [rad/s].
+      real(wp), intent(in) :: frequency
+      !> The period.
+      type(orbit_type), intent(inout) :: orbit
+
+      integer :: s, samples, stride
+
+      samples = merge(2*steps, steps, middles)
+      stride = 2*steps/samples
+      call reserve_orbit(orbit, samples)
+      orbit%samples = samples
+      do s = 0, samples
+         orbit%time(s) = 2.0_wp*pi*real(s, wp)/(frequency*real(samples, wp))
+         orbit%weight(s) = 1.0_wp/real(samples, wp)
+         orbit%value(:, s) = self%seen(lane, :, 1, stride*s)
+         orbit%rate(:, s) = self%seen(lane, :, 2, stride*s)
+         orbit%acceleration(:, s) = self%seen(lane, :, 3, stride*s)
+      end do
+      ! The trapezoidal rule is exact beyond every order for a periodic motion that is smooth.
+      orbit%weight([0, samples]) = 0.5_wp/real(samples, wp)
+   end subroutine take_orbit
+
+end module spurflex_integrate_lane_observe

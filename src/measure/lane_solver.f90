@@ -1,0 +1,287 @@
+!> Points in lanes, with what judges them: periodic motions are measured twice, with more than twice the steps the second time,
+!> and the difference is the error estimate.
+module spurflex_measure_lane_solver
+   use spurflex_base_attendant, only: attendant
+   use spurflex_base_error, only: error_type
+   use spurflex_base_kinds, only: wp
+   use spurflex_integrate_lane_ensemble, only: lane_ensemble
+   use spurflex_integrate_lane_observe, only: point_view, new_point_view, lane_view
+   use spurflex_integrate_options, only: solver_options
+   use spurflex_integrate_steps, only: aim, better_lane_steps
+   use spurflex_measure_lane_motion, only: measure_lanes
+   use spurflex_measure_response, only: response, empty_response, describe_motion, relative_difference
+   use spurflex_model_equations, only: equations_type
+   use spurflex_model_modal, only: modal_system, new_modal_system, same_modes
+   use spurflex_steady_outcome, only: steady_motion
+   use spurflex_steady_search, only: describe_orbit
+   use spurflex_steady_sections, only: weighted_norm
+   use spurflex_steady_shooting, only: periodic_orbit, find_orbits
+   use spurflex_steady_stability, only: find_stable_orbits
+   implicit none
+   private
+
+   public :: lane_solver, find_part, measure_orbits, measure_windows
+
+   !> Points in lanes.
+   type :: lane_solver
+      !> Options.
+      type(solver_options) :: options
+      !> The points, and those that judge them; room for what the lanes see.
+      type(lane_ensemble) :: points, judge
+      type(lane_view) :: view
+      !> Linear parts met so far, with their modes and displacements.
+      integer :: parts = 0
+      type(equations_type), allocatable :: linear(:)
+      type(modal_system), allocatable :: modal(:)
+      type(point_view), allocatable :: views(:)
+   end type lane_solver
+
+contains
+
+   !> Which of the linear parts met so far is that of a point; a new one is added to them.
+   subroutine find_part(solver, equations, part)
+      !> Solver.
+      type(lane_solver), intent(inout) :: solver
+      !> Equations of motion of the point.
+      type(equations_type), intent(in) :: equations
+      !> Index of the part; 0 where its modes cannot be found.
+      integer, intent(out) :: part
+
+      type(equations_type), allocatable :: linear(:)
+      type(modal_system), allocatable :: modal(:)
+      type(point_view), allocatable :: views(:)
+      type(modal_system) :: found
+      type(error_type), allocatable :: error
+
+      ! The latest first: neighbours come after each other.
+      do part = solver%parts, 1, -1
+         if (same_modes(solver%linear(part), equations)) return
+      end do
+      part = 0
+      call new_modal_system(equations, found, error)
+      if (allocated(error)) return
+      if (.not. allocated(solver%linear)) allocate (solver%linear(0), solver%modal(0), solver%views(0))
+      if (solver%parts == size(solver%linear)) then
+         allocate (linear(2*solver%parts + 8), modal(2*solver%parts + 8), views(2*solver%parts + 8))
+         linear(:solver%parts) = solver%linear(:solver%parts)
+         modal(:solver%parts) = solver%modal(:solver%parts)
+         views(:solver%parts) = solver%views(:solver%parts)
+         call move_alloc(linear, solver%linear)
+         call move_alloc(modal, solver%modal)
+         call move_alloc(views, solver%views)
+      end if
+      solver%parts = solver%parts + 1
+      part = solver%parts
+      solver%linear(part) = equations
+      solver%modal(part) = found
+      solver%views(part) = new_point_view(found)
+   end subroutine find_part
+
+   !> Measure periodic motions, with more and more steps where the tolerance asks for them.
+   subroutine measure_orbits(solver, equations, part, members, visitor, motions, orbits, answers, complete)
+      !> Solver, its points loaded.
+      type(lane_solver), intent(inout) :: solver
+      !> Equations of motion of each point, shape (n).
+      type(equations_type), intent(in) :: equations(:)
+      !> Linear part of each point, shape (n).
+      integer, intent(in) :: part(:)
+      !> Which of them.
+      integer, intent(in) :: members(:)
+      !> Let in now and then.
+      class(attendant), intent(inout) :: visitor
+      !> The motions, shape (n).
+      type(steady_motion), intent(inout) :: motions(:)
+      !> Their orbits, shape (n).
+      type(periodic_orbit), intent(inout) :: orbits(:)
+      !> The responses, shape (n).
+      type(response), intent(inout) :: answers(:)
+      !> The response meets the tolerance, shape (n).
+      logical, intent(inout) :: complete(:)
+
+      integer :: steps(size(equations)), next, i
+      integer, allocatable :: open(:), group(:)
+      logical :: agreed(size(equations))
+
+      open = members
+      steps = solver%points%steps
+      do while (size(open) > 0)
+         next = minval(steps(open))
+         group = pack(open, steps(open) == next)
+         agreed(group) = .true.
+         if (next /= solver%points%steps) then
+            call solver%points%load(equations, solver%modal, part, next)
+            call find_again(solver, group, visitor, motions, orbits, agreed)
+         end if
+         call judge_orbits(solver, equations, part, pack(group, agreed(group)), visitor, motions, orbits, answers, agreed)
+         do i = 1, size(group)
+            associate (p => group(i))
+               steps(p) = 0
+               if (.not. agreed(p)) cycle
+               complete(p) = answers(p)%error_estimate <= aim*solver%options%tolerance
+               call describe_motion(motions(p), answers(p))
+               if (.not. complete(p)) steps(p) = better_lane_steps(next, answers(p)%error_estimate, solver%options%tolerance)
+            end associate
+         end do
+         open = pack(open, steps(open) > 0 .and. .not. complete(open))
+      end do
+   end subroutine measure_orbits
+
+   !> Find orbits again with other steps.
+   subroutine find_again(solver, members, visitor, motions, orbits, found)
+      !> Solver, its points loaded with the other steps.
+      type(lane_solver), intent(inout) :: solver
+      !> Which of the points.
+      integer, intent(in) :: members(:)
+      !> Let in now and then.
+      class(attendant), intent(inout) :: visitor
+      !> The motions.
+      type(steady_motion), intent(inout) :: motions(:)
+      !> Their orbits.
+      type(periodic_orbit), intent(inout) :: orbits(:)
+      !> The orbit is there.
+      logical, intent(inout) :: found(:)
+
+      type(periodic_orbit) :: again(size(members))
+      logical :: is_found(size(members))
+      integer :: i
+
+      again = orbits(members)
+      call find_stable_orbits(solver%points, members, sizes(solver%points, members, again), visitor, again, is_found, &
+                              roughly=.not. solver%options%multipliers)
+      do i = 1, size(members)
+         associate (motion => motions(members(i)))
+            motion%periods_integrated = motion%periods_integrated + again(i)%integrated
+            found(members(i)) = is_found(i) .and. again(i)%periods == motion%periods
+            if (.not. found(members(i))) cycle
+            orbits(members(i)) = again(i)
+            call describe_orbit(again(i), solver%options, motion)
+         end associate
+      end do
+   end subroutine find_again
+
+   !> Measure orbits, find them again with more than twice the steps, measure those: the difference is the error estimate.
+   subroutine judge_orbits(solver, equations, part, members, visitor, motions, orbits, answers, agreed)
+      !> Solver, its points loaded.
+      type(lane_solver), intent(inout) :: solver
+      !> Equations of motion of each point, shape (n).
+      type(equations_type), intent(in) :: equations(:)
+      !> Linear part of each point, shape (n).
+      integer, intent(in) :: part(:)
+      !> Which of them.
+      integer, intent(in) :: members(:)
+      !> Let in now and then.
+      class(attendant), intent(inout) :: visitor
+      !> The motions, shape (n).
+      type(steady_motion), intent(inout) :: motions(:)
+      !> Their orbits, shape (n).
+      type(periodic_orbit), intent(in) :: orbits(:)
+      !> The responses, shape (n).
+      type(response), intent(inout) :: answers(:)
+      !> The judge finds the orbit too, shape (n).
+      logical, intent(inout) :: agreed(:)
+
+      type(periodic_orbit) :: judged(size(members))
+      type(response) :: measured(size(members)), judgement(size(members))
+      real(wp) :: states(solver%points%size, size(members))
+      integer :: i
+      logical :: found(size(members))
+
+      if (size(members) == 0) return
+      ! One more than twice as many: where the grids nest, a crossing can leave both with the same part of a step behind it.
+      ! The judge has steps enough to be looked at at their ends only.
+      solver%judge%record%middles = .false.
+      call solver%judge%load(equations, solver%modal, part, 2*solver%points%steps + 1)
+      measured = answers(members)
+      judgement = answers(members)
+      judged = orbits(members)
+      do i = 1, size(members)
+         states(:, i) = judged(i)%state
+      end do
+      call measure_lanes(solver%points, equations, solver%views, part, solver%view, members, judged%periods, visitor, states, &
+                         measured)
+      call find_orbits(solver%judge, members, sizes(solver%points, members, judged), visitor, judged, found, &
+                       monodromy_is_near=.true., roughly=.true.)
+      do i = 1, size(members)
+         states(:, i) = judged(i)%state
+      end do
+      call measure_lanes(solver%judge, equations, solver%views, part, solver%view, members, judged%periods, visitor, states, &
+                         judgement)
+      do i = 1, size(members)
+         measured(i)%error_estimate = max(relative_difference(equations(members(i)), measured(i), judgement(i)), &
+                                          solver%modal(part(members(i)))%roundoff)
+         motions(members(i))%periods_integrated = motions(members(i))%periods_integrated + judged(i)%integrated
+      end do
+      agreed(members) = found
+      answers(members) = measured
+   end subroutine judge_orbits
+
+   !> Sizes of motions.
+   pure function sizes(points, members, orbits) result(scale)
+      !> The points.
+      type(lane_ensemble), intent(in) :: points
+      !> Which of them, shape (n).
+      integer, intent(in) :: members(:)
+      !> The motions, shape (n).
+      type(periodic_orbit), intent(in) :: orbits(:)
+      !> Norms of their sections, or the backlash if that is larger, shape (n) [m].
+      real(wp) :: scale(size(orbits))
+
+      integer :: i
+
+      do i = 1, size(orbits)
+         scale(i) = max(weighted_norm(points%weight(:, members(i)), orbits(i)%state), points%half_backlash)
+      end do
+   end function sizes
+
+   !> Measure motions that are not periodic over a window; their error is what two halves of the window, or two numbers of steps,
+   !> differ by.
+   subroutine measure_windows(solver, equations, part, members, visitor, motions, answers, complete)
+      !> Solver, its points loaded.
+      type(lane_solver), intent(inout) :: solver
+      !> Equations of motion of each point, shape (n).
+      type(equations_type), intent(in) :: equations(:)
+      !> Linear part of each point, shape (n).
+      integer, intent(in) :: part(:)
+      !> Which of them.
+      integer, intent(in) :: members(:)
+      !> Let in now and then.
+      class(attendant), intent(inout) :: visitor
+      !> The motions; their states move to the end of the window, shape (n).
+      type(steady_motion), intent(inout) :: motions(:)
+      !> The responses, shape (n).
+      type(response), intent(inout) :: answers(:)
+      !> The response is complete, shape (n).
+      logical, intent(inout) :: complete(:)
+
+      type(response) :: whole(size(members)), judgement(size(members)), halves(2, size(members))
+      real(wp) :: states(solver%points%size, size(members))
+      integer :: periods(size(members)), i
+
+      if (size(members) == 0) return
+      call solver%judge%load(equations, solver%modal, part, 2*solver%points%steps + 1)
+      whole = answers(members)
+      judgement = whole
+      halves = empty_response()
+      periods = max(solver%options%measured_periods, 2)
+      do i = 1, size(members)
+         states(:, i) = motions(members(i))%state
+      end do
+      call measure_lanes(solver%judge, equations, solver%views, part, solver%view, members, periods/2, visitor, states, judgement)
+      do i = 1, size(members)
+         states(:, i) = motions(members(i))%state
+      end do
+      call measure_lanes(solver%points, equations, solver%views, part, solver%view, members, periods, visitor, states, whole, &
+                         halves)
+      do i = 1, size(members)
+         associate (p => members(i))
+            whole(i)%error_estimate = max(relative_difference(equations(p), halves(1, i), halves(2, i)), &
+                                          relative_difference(equations(p), halves(1, i), judgement(i)))
+            motions(p)%state = states(:, i)
+            call describe_motion(motions(p), whole(i))
+            answers(p) = whole(i)
+         end associate
+      end do
+      complete(members) = .true.
+   end subroutine measure_windows
+
+end module spurflex_measure_lane_solver

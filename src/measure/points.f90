@@ -1,0 +1,174 @@
+!> The measured responses of several operating points: a tile of the grid.
+!>
+!> Points are solved side by side in lanes. The motion is found with a few steps a mesh period; a periodic one is found again
+!> with more than twice as many, and the difference is the error estimate. A point whose estimate misses the tolerance gets
+!> more steps, and goes on alone, by the integrator of high order, where lanes would need too many.
+module spurflex_measure_points
+   use spurflex_base_attendant, only: attendant
+   use spurflex_base_kinds, only: wp
+   use spurflex_integrate_lane_ensemble, only: widen, narrow
+   use spurflex_integrate_options, only: solver_options, integrator_collocation
+   use spurflex_integrate_steps, only: first_lane_steps, most_lane_steps
+   use spurflex_measure_lane_solver, only: lane_solver, find_part, measure_orbits, measure_windows
+   use spurflex_measure_point, only: point_solver, new_point_solver, respond_alone
+   use spurflex_measure_response, only: response, empty_response
+   use spurflex_model_equations, only: equations_type
+   use spurflex_model_modal, only: to_modes, from_modes
+   use spurflex_steady_outcome, only: steady_motion, status_diverged
+   use spurflex_steady_search, only: find_steady_motions
+   use spurflex_steady_shooting, only: periodic_orbit
+   implicit none
+   private
+
+   public :: solver_type, new_solver, respond, respond_one
+
+   !> What solves points; keeps what the next points can use again.
+   type :: solver_type
+      private
+      !> Solves points in lanes.
+      type(lane_solver) :: lanes
+      !> Solves points one after the other.
+      type(point_solver) :: alone
+   end type solver_type
+
+contains
+
+   !> Make a solver.
+   subroutine new_solver(options, solver)
+      !> Options.
+      type(solver_options), intent(in) :: options
+      !> The solver.
+      type(solver_type), intent(out) :: solver
+
+      solver%lanes%options = options
+      call new_point_solver(options, solver%alone)
+   end subroutine new_solver
+
+   !> The response of one point. A point that fails is a status in the response, not an error.
+   subroutine respond_one(solver, equations, position, velocity, visitor, answer)
+      !> Solver.
+      type(solver_type), intent(inout) :: solver
+      !> Equations of motion of the point.
+      type(equations_type), intent(in) :: equations
+      !> Deviation from the static equilibrium and its rate: at the start before, at the last section after, shape (n).
+      real(wp), intent(inout) :: position(:), velocity(:)
+      !> Let in now and then.
+      class(attendant), intent(inout) :: visitor
+      !> The response.
+      type(response), intent(out) :: answer
+
+      type(response) :: answers(1)
+      real(wp) :: positions(size(position), 1), velocities(size(velocity), 1)
+
+      positions(:, 1) = position
+      velocities(:, 1) = velocity
+      call respond(solver, [equations], positions, velocities, visitor, answers)
+      position = positions(:, 1)
+      velocity = velocities(:, 1)
+      answer = answers(1)
+   end subroutine respond_one
+
+   !> The responses of several points. A point that fails is a status in its response, not an error.
+   subroutine respond(solver, equations, positions, velocities, visitor, answers)
+      !> Solver.
+      type(solver_type), intent(inout) :: solver
+      !> Equations of motion of each point, shape (points).
+      type(equations_type), intent(in) :: equations(:)
+      !> Deviation from the static equilibrium and its rate: at the start before, at the last section after, shape (n, points).
+      real(wp), intent(inout) :: positions(:, :), velocities(:, :)
+      !> Let in now and then.
+      class(attendant), intent(inout) :: visitor
+      !> The responses, shape (points).
+      type(response), intent(out) :: answers(:)
+
+      type(steady_motion) :: motions(size(equations))
+      real(wp), allocatable :: position(:), velocity(:)
+      integer :: steps(size(equations)), part(size(equations)), i, k
+      integer, allocatable :: group(:)
+      logical :: done(size(equations))
+
+      done = .false.
+      if (solver%lanes%options%steps_per_period == 0) then
+         do i = 1, size(equations)
+            call find_part(solver%lanes, equations(i), part(i))
+            steps(i) = huge(steps)
+            if (part(i) > 0) steps(i) = first_lane_steps(equations(i), solver%lanes%modal(part(i)), &
+                                                         solver%lanes%options%tolerance)
+         end do
+         do i = 1, size(equations)
+            if (steps(i) > most_lane_steps .or. any(steps(:i - 1) == steps(i))) cycle
+            group = pack([(k, k=1, size(equations))], steps == steps(i))
+            call respond_in_lanes(solver%lanes, equations(group), part(group), steps(i), positions, velocities, group, visitor, &
+                                  motions, answers, done)
+         end do
+      end if
+      do i = 1, size(equations)
+         if (done(i)) cycle
+         position = positions(:, i)
+         velocity = velocities(:, i)
+         call respond_alone(solver%alone, equations(i), position, velocity, visitor, motions(i), answers(i))
+         positions(:, i) = position
+         velocities(:, i) = velocity
+      end do
+   end subroutine respond
+
+   !> Find motions in lanes, and measure them there as far as lanes meet the tolerance.
+   subroutine respond_in_lanes(solver, equations, part, steps, positions, velocities, group, visitor, motions, answers, done)
+      !> Solver.
+      type(lane_solver), intent(inout) :: solver
+      !> Equations of motion of each point of the group, shape (n).
+      type(equations_type), intent(in) :: equations(:)
+      !> Linear part of each point of the group, shape (n).
+      integer, intent(in) :: part(:)
+      !> Steps per mesh period.
+      integer, intent(in) :: steps
+      !> Start of every point; where its motion is found, a section of it.
+      real(wp), intent(inout) :: positions(:, :), velocities(:, :)
+      !> Points of the group, shape (n).
+      integer, intent(in) :: group(:)
+      !> Let in now and then.
+      class(attendant), intent(inout) :: visitor
+      !> Motion of every point; its status remains `status_missing` if it must be found by other means.
+      type(steady_motion), intent(inout) :: motions(:)
+      !> Response of every point.
+      type(response), intent(inout) :: answers(:)
+      !> The response of every point is complete.
+      logical, intent(inout) :: done(:)
+
+      type(steady_motion) :: found(size(group))
+      type(periodic_orbit) :: orbits(size(group))
+      type(response) :: measured(size(group))
+      real(wp), allocatable :: starts(:, :), position(:), velocity(:)
+      logical :: complete(size(group))
+      integer :: i
+
+      call solver%points%load(equations, solver%modal, part, steps)
+      allocate (starts(solver%points%size, size(group)))
+      do i = 1, size(group)
+         starts(:, i) = widen(to_modes(solver%modal(part(i)), positions(:, group(i)), velocities(:, group(i))), &
+                              solver%points%size/2)
+      end do
+      call find_steady_motions(solver%points, starts, solver%options, visitor, found, orbits)
+      complete = .false.
+      measured = empty_response()
+      if (solver%options%integrator == integrator_collocation) then
+         call measure_windows(solver, equations, part, pack([(i, i=1, size(group))], found%status /= status_diverged &
+                                                      .and. found%periods == 0), visitor, found, measured, complete)
+         call measure_orbits(solver, equations, part, pack([(i, i=1, size(group))], found%periods > 0), visitor, found, orbits, &
+                             measured, complete)
+      end if
+      do i = 1, size(group)
+         ! What diverges in lanes may have had too few steps.
+         if (found(i)%status == status_diverged) cycle
+         associate (modal => solver%modal(part(i)))
+            call from_modes(modal, narrow(found(i)%state, modal%modes), position, velocity)
+         end associate
+         positions(:, group(i)) = position
+         velocities(:, group(i)) = velocity
+         motions(group(i)) = found(i)
+         done(group(i)) = complete(i)
+         if (complete(i)) answers(group(i)) = measured(i)
+      end do
+   end subroutine respond_in_lanes
+
+end module spurflex_measure_points

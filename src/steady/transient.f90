@@ -1,0 +1,171 @@
+!> Transients: motions under way from their start, several side by side, with what has been seen of them.
+module spurflex_steady_transient
+   use spurflex_base_attendant, only: attendant
+   use spurflex_base_kinds, only: wp
+   use spurflex_integrate_ensemble, only: ensemble
+   use spurflex_steady_lyapunov, only: lyapunov_sum
+   use spurflex_steady_sections, only: section_ring, weighted_norm
+   implicit none
+   private
+
+   public :: transient_type, begin_transient, watch_from_now, advance_transients, drifts
+
+   !> A state of this norm has left every physical range; far below overflow [m].
+   real(wp), parameter :: diverged_norm = 1.0e100_wp
+
+   !> Relative difference of the ranges of two halves of a motion that has arrived.
+   real(wp), parameter :: same_range = 0.05_wp
+
+   !> A transient under way.
+   type :: transient_type
+      !> State at the latest section, and a tangent there, shape (size).
+      real(wp), allocatable :: state(:), tangent(:)
+      !> Latest sections.
+      type(section_ring) :: ring
+      !> Growth of the tangent.
+      type(lyapunov_sum) :: growth
+      !> Mesh periods integrated.
+      integer :: periods = 0
+      !> The state is finite.
+      logical :: sound = .true.
+      !> Norms of the sections while the growth is summed: extremes over the first and the second half [m].
+      real(wp) :: low(2) = huge(1.0_wp), high(2) = -huge(1.0_wp)
+      !> Mesh period at which the second half begins.
+      integer :: half = 0
+      !> A tangent is carried and its growth is summed.
+      logical :: grows = .false.
+   end type transient_type
+
+contains
+
+   !> Begin a transient.
+   pure subroutine begin_transient(weight, start, transient)
+      !> Weights of the states, shape (size).
+      real(wp), intent(in) :: weight(:)
+      !> State at the first section, shape (size).
+      real(wp), intent(in) :: start(:)
+      !> The transient.
+      type(transient_type), intent(out) :: transient
+
+      transient%state = start
+      allocate (transient%tangent(size(start)), source=1.0_wp)
+      transient%tangent = transient%tangent/weighted_norm(weight, transient%tangent)
+      call transient%ring%reset(weight)
+      call transient%ring%add(start)
+   end subroutine begin_transient
+
+   !> Watch anew: what came before was still on its way.
+   pure subroutine watch_from_now(transient, until, grows)
+      !> The transient.
+      type(transient_type), intent(inout) :: transient
+      !> Mesh period up to which it will be watched.
+      integer, intent(in) :: until
+      !> The growth of a tangent is wanted.
+      logical, intent(in) :: grows
+
+      call transient%growth%reset()
+      transient%low = huge(1.0_wp)
+      transient%high = -huge(1.0_wp)
+      transient%half = (transient%periods + until)/2
+      transient%grows = grows
+   end subroutine watch_from_now
+
+   !> Integrate transients, each up to a period of its own. A seat that becomes free is taken by the next at once.
+   subroutine advance_transients(points, members, until, transients, visitor)
+      !> The points.
+      class(ensemble), intent(inout) :: points
+      !> Which of them, shape (n).
+      integer, intent(in) :: members(:)
+      !> Mesh periods in all, shape (n).
+      integer, intent(in) :: until(:)
+      !> The transients, shape (points).
+      type(transient_type), intent(inout) :: transients(:)
+      !> Let in between the periods.
+      class(attendant), intent(inout) :: visitor
+
+      real(wp) :: states(points%seats, points%size), tangents(points%seats, 1, points%size)
+      integer :: seated(points%seats), next, k
+      logical :: grows
+
+      states = 0.0_wp
+      tangents = 0.0_wp
+      seated = 0
+      next = 1
+      do
+         do k = 1, points%seats
+            do while (seated(k) == 0 .and. next <= size(members))
+               if (transients(members(next))%sound .and. transients(members(next))%periods < until(next)) then
+                  seated(k) = next
+                  call points%seat(k, members(next))
+                  states(k, :) = transients(members(next))%state
+                  tangents(k, 1, :) = transients(members(next))%tangent
+               end if
+               next = next + 1
+            end do
+         end do
+         if (all(seated == 0)) exit
+         grows = .false.
+         do k = 1, points%seats
+            if (seated(k) > 0) grows = grows .or. transients(members(seated(k)))%grows
+         end do
+         if (grows) then
+            call points%advance(states, tangents)
+         else
+            call points%advance(states)
+         end if
+         do k = 1, points%seats
+            if (seated(k) == 0) cycle
+            associate (transient => transients(members(seated(k))))
+               call see_section(points%weight(:, members(seated(k))), states(k, :), tangents(k, 1, :), transient)
+               if (transient%sound .and. transient%periods < until(seated(k))) cycle
+               transient%tangent = tangents(k, 1, :)
+               seated(k) = 0
+            end associate
+         end do
+         call visitor%attend()
+      end do
+   end subroutine advance_transients
+
+   !> See the next section of a transient.
+   pure subroutine see_section(weight, state, tangent, transient)
+      !> Weights of the states, shape (size).
+      real(wp), intent(in) :: weight(:)
+      !> The section, shape (size).
+      real(wp), intent(in) :: state(:)
+      !> The tangent, made a unit again while its growth is summed, shape (size).
+      real(wp), intent(inout) :: tangent(:)
+      !> The transient.
+      type(transient_type), intent(inout) :: transient
+
+      real(wp) :: norm
+      integer :: which
+
+      if (transient%grows) then
+         call transient%growth%add(weight, tangent)
+      else
+         tangent = transient%tangent
+      end if
+      transient%state = state
+      transient%periods = transient%periods + 1
+      call transient%ring%add(state)
+      norm = weighted_norm(weight, state)
+      transient%sound = norm < diverged_norm
+      which = merge(1, 2, transient%periods <= transient%half)
+      transient%low(which) = min(transient%low(which), norm)
+      transient%high(which) = max(transient%high(which), norm)
+   end subroutine see_section
+
+   !> A motion is still on its way: its sections range over more, or less, in the second half than in the first.
+   pure function drifts(transient) result(it_does)
+      !> The transient.
+      type(transient_type), intent(in) :: transient
+      !> It is.
+      logical :: it_does
+
+      real(wp) :: range(2)
+
+      range = max(transient%high - transient%low, 0.0_wp)
+      it_does = abs(range(2) - range(1)) > same_range*maxval(range)
+   end function drifts
+
+end module spurflex_steady_transient
