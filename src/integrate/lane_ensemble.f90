@@ -2,6 +2,7 @@
 module spurflex_integrate_lane_ensemble
    use spurflex_base_kinds, only: wp
    use spurflex_integrate_ensemble, only: ensemble
+   use spurflex_integrate_lane_newmark, only: new_newmark_rule, advance_newmark, carry_newmark
    use spurflex_integrate_lane_rule, only: lanes, most_modes, points, lane_rule, mesh_cycle, lane_gain, lane_record, &
       point_rule, new_point_rule, new_mesh_cycle, load_rule
    use spurflex_integrate_lane_step, only: advance_lanes, carry_lane_tangents
@@ -15,6 +16,10 @@ module spurflex_integrate_lane_ensemble
    !> Points in lanes. A state holds the real parts of the modes, then the imaginary parts; a point with fewer modes than the
    !> others has zeros behind its own.
    type, extends(ensemble) :: lane_ensemble
+      !> By Newmark's method of average acceleration, not by collocation.
+      logical :: by_newmark = .false.
+      !> The middles of the steps are recorded too, by collocation.
+      logical :: with_middles = .true.
       !> Steps per mesh period.
       integer :: steps = 0
       !> The latest period of each seat, if it was recorded.
@@ -57,12 +62,17 @@ contains
       if (.not. allocated(self%smallest)) allocate (self%smallest(lanes), self%largest(lanes), source=0.0_wp)
       call reserve(self, steps)
       self%steps = steps
+      self%record%middles = self%with_middles .and. .not. self%by_newmark
       call new_mesh_cycle(equations(1)%mesh, steps, self%pitch)
       if (allocated(self%rules)) deallocate (self%rules)
       if (allocated(self%weight)) deallocate (self%weight)
       allocate (self%rules(size(equations)), self%weight(self%size, size(equations)))
       do i = 1, size(equations)
-         call new_point_rule(modal(part(i)), equations(i), steps, self%rules(i))
+         if (self%by_newmark) then
+            call new_newmark_rule(modal(part(i)), equations(i), steps, self%rules(i))
+         else
+            call new_point_rule(modal(part(i)), equations(i), steps, self%rules(i))
+         end if
          self%weight(:, i) = widen(state_weights(modal(part(i))), modes)
       end do
       ! An empty lane follows the first point.
@@ -106,7 +116,12 @@ contains
       !> Tangents that see the same contact, shape (seats, tangents, size).
       real(wp), intent(inout), optional, contiguous :: tangents(:, :, :)
 
-      if (.not. present(tangents)) then
+      if (self%by_newmark .and. present(tangents)) then
+         call advance_newmark(self%rule, self%pitch, states, self%smallest, self%largest, self%gain)
+         call carry_newmark(self%rule, self%steps, self%gain, size(tangents, 2), tangents)
+      else if (self%by_newmark) then
+         call advance_newmark(self%rule, self%pitch, states, self%smallest, self%largest)
+      else if (.not. present(tangents)) then
          call advance_lanes(self%rule, self%pitch, states, self%smallest, self%largest)
       else
          call advance_lanes(self%rule, self%pitch, states, self%smallest, self%largest, self%gain)
@@ -121,7 +136,11 @@ contains
       !> States at the section, shape (seats, size).
       real(wp), intent(inout), contiguous :: states(:, :)
 
-      call advance_lanes(self%rule, self%pitch, states, self%smallest, self%largest, record=self%record)
+      if (self%by_newmark) then
+         call advance_newmark(self%rule, self%pitch, states, self%smallest, self%largest, record=self%record)
+      else
+         call advance_lanes(self%rule, self%pitch, states, self%smallest, self%largest, record=self%record)
+      end if
    end subroutine advance_recorded
 
    !> Bound of what a difference of states does to the mesh deflection.

@@ -7,7 +7,8 @@ module spurflex_integrate_steps
    implicit none
    private
 
-   public :: first_steps, better_steps, most_steps, aim, first_lane_steps, better_lane_steps, most_lane_steps
+   public :: first_steps, better_steps, most_steps, aim, first_lane_steps, better_lane_steps, &
+      newmark_lane_steps, most_lane_steps, most_newmark_steps
 
    !> Steps per mesh period at most.
    integer, parameter :: most_steps = 65536
@@ -28,7 +29,7 @@ module spurflex_integrate_steps
    integer, parameter :: lane_steps(14) = [16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024, 1536]
 
    !> Most steps to begin with, and most by which a tolerance is met, in lanes.
-   integer, parameter :: most_lane_steps = 1024, most_refined_steps = 192
+   integer, parameter :: most_lane_steps = 1024, most_refined_steps = 192, most_newmark_steps = 16384
 
    !> Share of what gives way to the mesh force from which on a mode is felt.
    real(wp), parameter :: felt_share = 0.02_wp
@@ -110,20 +111,49 @@ contains
                                         real(lane_steps(1), wp)))
    end function first_lane_steps
 
-   !> Steps of collocation in lanes that should meet the tolerance.
-   pure function better_lane_steps(steps, error, tolerance) result(better)
+   !> Steps in lanes that should meet the tolerance.
+   pure function better_lane_steps(steps, error, options) result(better)
       !> Steps per mesh period.
       integer, intent(in) :: steps
       !> Their relative error.
       real(wp), intent(in) :: error
-      !> Relative error that is asked for.
-      real(wp), intent(in) :: tolerance
+      !> Integrator and tolerance.
+      type(solver_options), intent(in) :: options
       !> More steps per mesh period; zero where lanes are no use.
       integer :: better
 
-      better = next_lane_steps(real(steps, wp)*max((error/(aim*tolerance))**(1.0_wp/lane_order), least_growth))
-      if (better <= steps .or. better > max(most_refined_steps, 2*steps)) better = 0
+      if (options%integrator == integrator_newmark) then
+         better = 0
+         if (steps < most_newmark_steps) better = next_newmark_steps(better_steps(steps, error, options))
+      else
+         better = next_lane_steps(real(steps, wp)*max((error/(aim*options%tolerance))**(1.0_wp/lane_order), least_growth))
+         if (better > max(most_refined_steps, 2*steps)) better = 0
+      end if
+      if (better <= steps) better = 0
    end function better_lane_steps
+
+   !> Steps of Newmark's method in lanes to begin with.
+   pure function newmark_lane_steps(equations) result(steps)
+      !> Equations of motion.
+      type(equations_type), intent(in) :: equations
+      !> Steps per mesh period.
+      integer :: steps
+
+      steps = next_newmark_steps(max(fewest_newmark, nint(min(cycle_phase(equations)/newmark_phase, real(most_steps, wp)))))
+   end function newmark_lane_steps
+
+   !> The next number of steps that Newmark's method may have in lanes: a power of two, or half as many more.
+   pure function next_newmark_steps(wanted) result(steps)
+      !> Steps wanted.
+      integer, intent(in) :: wanted
+      !> As many or more, up to `most_newmark_steps`.
+      integer :: steps
+
+      steps = fewest_newmark
+      do while (steps < min(wanted, most_newmark_steps))
+         steps = merge(steps + steps/2, steps + steps/3, iand(steps, steps - 1) == 0)
+      end do
+   end function next_newmark_steps
 
    !> The next number of steps that lanes may have.
    pure function next_lane_steps(wanted) result(steps)

@@ -6,10 +6,10 @@ module spurflex_measure_lane_solver
    use spurflex_base_kinds, only: wp
    use spurflex_integrate_lane_ensemble, only: lane_ensemble
    use spurflex_integrate_lane_observe, only: point_view, new_point_view, lane_view
-   use spurflex_integrate_options, only: solver_options
-   use spurflex_integrate_steps, only: aim, better_lane_steps
+   use spurflex_integrate_options, only: solver_options, integrator_newmark
+   use spurflex_integrate_steps, only: aim, better_lane_steps, newmark_lane_steps
    use spurflex_measure_lane_motion, only: measure_lanes
-   use spurflex_measure_response, only: response, empty_response, describe_motion, relative_difference
+   use spurflex_measure_response, only: response, empty_response, describe_motion, relative_difference, status_inaccurate
    use spurflex_model_equations, only: equations_type
    use spurflex_model_modal, only: modal_system, new_modal_system, same_modes
    use spurflex_steady_outcome, only: steady_motion
@@ -28,12 +28,16 @@ module spurflex_measure_lane_solver
       type(solver_options) :: options
       !> The points, and those that judge them; room for what the lanes see.
       type(lane_ensemble) :: points, judge
+      !> Steps per mesh period with which collocation finds the motion; the judge takes more than twice as many.
+      integer :: steps = 0
       type(lane_view) :: view
       !> Linear parts met so far, with their modes and displacements.
       integer :: parts = 0
       type(equations_type), allocatable :: linear(:)
       type(modal_system), allocatable :: modal(:)
       type(point_view), allocatable :: views(:)
+   contains
+      procedure :: by_newmark
    end type lane_solver
 
 contains
@@ -103,28 +107,60 @@ contains
       logical :: agreed(size(equations))
 
       open = members
-      steps = solver%points%steps
+      do i = 1, size(equations)
+         steps(i) = measuring_steps(solver, equations(i))
+      end do
       do while (size(open) > 0)
          next = minval(steps(open))
          group = pack(open, steps(open) == next)
          agreed(group) = .true.
-         if (next /= solver%points%steps) then
+         if (next /= solver%points%steps .or. (solver%by_newmark() .neqv. solver%points%by_newmark)) then
+            solver%points%by_newmark = solver%by_newmark()
             call solver%points%load(equations, solver%modal, part, next)
             call find_again(solver, group, visitor, motions, orbits, agreed)
          end if
          call judge_orbits(solver, equations, part, pack(group, agreed(group)), visitor, motions, orbits, answers, agreed)
          do i = 1, size(group)
-            associate (p => group(i))
+            associate (p => group(i), error => answers(group(i))%error_estimate)
                steps(p) = 0
                if (.not. agreed(p)) cycle
-               complete(p) = answers(p)%error_estimate <= aim*solver%options%tolerance
                call describe_motion(motions(p), answers(p))
-               if (.not. complete(p)) steps(p) = better_lane_steps(next, answers(p)%error_estimate, solver%options%tolerance)
+               if (solver%options%steps_per_period > 0) then
+                  complete(p) = .true.
+                  if (error > solver%options%tolerance) answers(p)%status = status_inaccurate
+               else
+                  complete(p) = error <= aim*solver%options%tolerance
+                  if (.not. complete(p)) steps(p) = better_lane_steps(next, error, solver%options)
+               end if
             end associate
          end do
          open = pack(open, steps(open) > 0 .and. .not. complete(open))
       end do
    end subroutine measure_orbits
+
+   !> Points are measured by Newmark's method, not by the collocation that finds their motions.
+   pure function by_newmark(self) result(they_are)
+      !> Solver.
+      class(lane_solver), intent(in) :: self
+      !> They are.
+      logical :: they_are
+
+      they_are = self%options%integrator == integrator_newmark
+   end function by_newmark
+
+   !> Steps with which a point is measured at first.
+   pure function measuring_steps(solver, equations) result(steps)
+      !> Solver.
+      type(lane_solver), intent(in) :: solver
+      !> Equations of motion of the point.
+      type(equations_type), intent(in) :: equations
+      !> Steps per mesh period.
+      integer :: steps
+
+      steps = solver%steps
+      if (solver%options%steps_per_period > 0) steps = solver%options%steps_per_period
+      if (solver%options%steps_per_period == 0 .and. solver%by_newmark()) steps = newmark_lane_steps(equations)
+   end function measuring_steps
 
    !> Find orbits again with other steps.
    subroutine find_again(solver, members, visitor, motions, orbits, found)
@@ -187,10 +223,7 @@ contains
       logical :: found(size(members))
 
       if (size(members) == 0) return
-      ! One more than twice as many: where the grids nest, a crossing can leave both with the same part of a step behind it.
-      ! The judge has steps enough to be looked at at their ends only.
-      solver%judge%record%middles = .false.
-      call solver%judge%load(equations, solver%modal, part, 2*solver%points%steps + 1)
+      call load_judge(solver, equations, part)
       measured = answers(members)
       judgement = answers(members)
       judged = orbits(members)
@@ -214,6 +247,21 @@ contains
       agreed(members) = found
       answers(members) = measured
    end subroutine judge_orbits
+
+   !> Load the judge, which collocates with more than twice the steps.
+   subroutine load_judge(solver, equations, part)
+      !> Solver, its points loaded.
+      type(lane_solver), intent(inout) :: solver
+      !> Equations of motion of each point, shape (n).
+      type(equations_type), intent(in) :: equations(:)
+      !> Linear part of each point, shape (n).
+      integer, intent(in) :: part(:)
+
+      ! One more than twice as many: where the grids nest, a crossing can leave both with the same part of a step behind it.
+      ! They are enough to be looked at at their ends only.
+      solver%judge%with_middles = .false.
+      call solver%judge%load(equations, solver%modal, part, 2*merge(solver%steps, solver%points%steps, solver%by_newmark()) + 1)
+   end subroutine load_judge
 
    !> Sizes of motions.
    pure function sizes(points, members, orbits) result(scale)
@@ -253,35 +301,54 @@ contains
       !> The response is complete, shape (n).
       logical, intent(inout) :: complete(:)
 
-      type(response) :: whole(size(members)), judgement(size(members)), halves(2, size(members))
-      real(wp) :: states(solver%points%size, size(members))
-      integer :: periods(size(members)), i
+      integer :: steps(size(equations)), i
 
-      if (size(members) == 0) return
-      call solver%judge%load(equations, solver%modal, part, 2*solver%points%steps + 1)
-      whole = answers(members)
-      judgement = whole
-      halves = empty_response()
-      periods = max(solver%options%measured_periods, 2)
-      do i = 1, size(members)
-         states(:, i) = motions(members(i))%state
+      do i = 1, size(equations)
+         steps(i) = measuring_steps(solver, equations(i))
       end do
-      call measure_lanes(solver%judge, equations, solver%views, part, solver%view, members, periods/2, visitor, states, judgement)
       do i = 1, size(members)
-         states(:, i) = motions(members(i))%state
-      end do
-      call measure_lanes(solver%points, equations, solver%views, part, solver%view, members, periods, visitor, states, whole, &
-                         halves)
-      do i = 1, size(members)
-         associate (p => members(i))
-            whole(i)%error_estimate = max(relative_difference(equations(p), halves(1, i), halves(2, i)), &
-                                          relative_difference(equations(p), halves(1, i), judgement(i)))
-            motions(p)%state = states(:, i)
-            call describe_motion(motions(p), whole(i))
-            answers(p) = whole(i)
-         end associate
+         if (any(steps(members(:i - 1)) == steps(members(i)))) cycle
+         solver%points%by_newmark = solver%by_newmark()
+         call solver%points%load(equations, solver%modal, part, steps(members(i)))
+         call load_judge(solver, equations, part)
+         call measure_group(pack(members, steps(members) == steps(members(i))))
       end do
       complete(members) = .true.
+
+   contains
+
+      !> Measure those that have the same steps.
+      subroutine measure_group(group)
+         !> Which of the points.
+         integer, intent(in) :: group(:)
+
+         type(response) :: whole(size(group)), judgement(size(group)), halves(2, size(group))
+         real(wp) :: states(solver%points%size, size(group)), judged(solver%points%size, size(group))
+         integer :: periods(size(group)), k
+
+         whole = answers(group)
+         judgement = whole
+         halves = empty_response()
+         periods = max(solver%options%measured_periods, 2)
+         do k = 1, size(group)
+            states(:, k) = motions(group(k))%state
+         end do
+         judged = states
+         call measure_lanes(solver%judge, equations, solver%views, part, solver%view, group, periods/2, visitor, judged, &
+                            judgement)
+         call measure_lanes(solver%points, equations, solver%views, part, solver%view, group, periods, visitor, states, whole, &
+                            halves)
+         do k = 1, size(group)
+            associate (p => group(k))
+               whole(k)%error_estimate = max(relative_difference(equations(p), halves(1, k), halves(2, k)), &
+                                             relative_difference(equations(p), halves(1, k), judgement(k)))
+               motions(p)%state = states(:, k)
+               call describe_motion(motions(p), whole(k))
+               answers(p) = whole(k)
+            end associate
+         end do
+      end subroutine measure_group
+
    end subroutine measure_windows
 
 end module spurflex_measure_lane_solver

@@ -7,8 +7,8 @@ module spurflex_measure_points
    use spurflex_base_attendant, only: attendant
    use spurflex_base_kinds, only: wp
    use spurflex_integrate_lane_ensemble, only: widen, narrow
-   use spurflex_integrate_options, only: solver_options, integrator_collocation
-   use spurflex_integrate_steps, only: first_lane_steps, most_lane_steps
+   use spurflex_integrate_options, only: solver_options, integrator_collocation, integrator_newmark
+   use spurflex_integrate_steps, only: first_lane_steps, most_lane_steps, most_newmark_steps
    use spurflex_measure_lane_solver, only: lane_solver, find_part, measure_orbits, measure_windows
    use spurflex_measure_point, only: point_solver, new_point_solver, respond_alone
    use spurflex_measure_response, only: response, empty_response
@@ -88,7 +88,7 @@ contains
       logical :: done(size(equations))
 
       done = .false.
-      if (solver%lanes%options%steps_per_period == 0) then
+      if (solve_in_lanes(solver%lanes%options)) then
          do i = 1, size(equations)
             call find_part(solver%lanes, equations(i), part(i))
             steps(i) = huge(steps)
@@ -111,6 +111,28 @@ contains
          velocities(:, i) = velocity
       end do
    end subroutine respond
+
+   !> Lanes can do what is asked for: collocation with free steps, or Newmark's method of average acceleration.
+   pure function solve_in_lanes(options) result(they_can)
+      !> Options.
+      type(solver_options), intent(in) :: options
+      !> They can.
+      logical :: they_can
+
+      they_can = options%steps_per_period == 0
+      if (options%integrator == integrator_newmark .and. options%steps_per_period > 0) &
+         they_can = is_average(options) .and. options%steps_per_period <= most_newmark_steps
+   end function solve_in_lanes
+
+   !> Newmark's method takes the average acceleration.
+   pure function is_average(options) result(it_does)
+      !> Options.
+      type(solver_options), intent(in) :: options
+      !> It does.
+      logical :: it_does
+
+      it_does = .not. (abs(options%newmark_beta - 0.25_wp) > 0.0_wp .or. abs(options%newmark_gamma - 0.5_wp) > 0.0_wp)
+   end function is_average
 
    !> Find motions in lanes, and measure them there as far as lanes meet the tolerance.
    subroutine respond_in_lanes(solver, equations, part, steps, positions, velocities, group, visitor, motions, answers, done)
@@ -142,7 +164,11 @@ contains
       logical :: complete(size(group))
       integer :: i
 
-      call solver%points%load(equations, solver%modal, part, steps)
+      ! Steps that are given choose the motion too; free ones are chosen to measure it, and collocation finds it.
+      solver%steps = steps
+      solver%points%by_newmark = solver%options%steps_per_period > 0
+      call solver%points%load(equations, solver%modal, part, &
+                              merge(solver%options%steps_per_period, steps, solver%points%by_newmark))
       allocate (starts(solver%points%size, size(group)))
       do i = 1, size(group)
          starts(:, i) = widen(to_modes(solver%modal(part(i)), positions(:, group(i)), velocities(:, group(i))), &
@@ -151,7 +177,7 @@ contains
       call find_steady_motions(solver%points, starts, solver%options, visitor, found, orbits)
       complete = .false.
       measured = empty_response()
-      if (solver%options%integrator == integrator_collocation) then
+      if (solver%options%integrator == integrator_collocation .or. is_average(solver%options)) then
          call measure_windows(solver, equations, part, pack([(i, i=1, size(group))], found%status /= status_diverged &
                                                       .and. found%periods == 0), visitor, found, measured, complete)
          call measure_orbits(solver, equations, part, pack([(i, i=1, size(group))], found%periods > 0), visitor, found, orbits, &
