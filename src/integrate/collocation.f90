@@ -13,7 +13,7 @@ module spurflex_integrate_collocation
    use spurflex_integrate_mesh_table, only: mesh_points, set_mesh_points
    use spurflex_integrate_period_map, only: period_map, orbit_type, reserve_orbit
    use spurflex_model_equations, only: equations_type
-   use spurflex_model_modal, only: modal_system, new_modal_system, same_modes, state_weights, to_modes, from_modes, &
+   use spurflex_model_modal, only: modal_system, new_modal_system, same_modes, to_modes, from_modes, &
       sum_of_moduli
    implicit none
    private
@@ -70,7 +70,7 @@ contains
          self%whole = step_coefficients()
          self%part = step_coefficients()
          self%size = 2*self%modal%modes
-         self%weight = state_weights(self%modal)
+         self%weight = self%modal%weight
       end if
       self%equations = equations
       self%half_backlash = equations%mesh%half_backlash

@@ -24,6 +24,14 @@ module spurflex_integrate_lane_crossing
                                                 0.887298334620741688517926539978_wp]
    real(wp), parameter :: gauss_weight(gauss) = [5.0_wp/18.0_wp, 4.0_wp/9.0_wp, 5.0_wp/18.0_wp]
 
+   !> Clearance to a border over a step, s + p u + q u^2 with u from 0 to 1, for each lane.
+   type :: parabola_type
+      !> Its coefficients [m].
+      real(wp), dimension(lanes) :: s, p, q
+      !> 1 where the step begins in contact at this border, -1 where not.
+      real(wp), dimension(lanes) :: begins
+   end type parabola_type
+
 contains
 
    !> Solve a step again with the force beyond the borders put right.
@@ -33,7 +41,7 @@ contains
       type(lane_rule), intent(in) :: rule
       !> The mesh.
       type(mesh_cycle), intent(in) :: pitch
-      !> Index of the start of the step in the pitch.
+      !> Index of the start of the step in the cycle.
       integer, intent(in) :: place
       !> Branch at the start.
       real(wp), intent(in) :: side(lanes)
@@ -53,17 +61,31 @@ contains
       logical, intent(in) :: with_slope
 
       real(wp), dimension(lanes, points) :: added, corrected, forces
-      real(wp), dimension(lanes) :: from, until, beyond
+      real(wp), dimension(lanes) :: from, until
+      real(wp) :: beyond(lanes, -1:1)
+      type(parabola_type) :: gap
+      logical :: concerned(-1:1)
       integer :: k, l, border
 
+      ! Which borders are crossed is told by the deflection that the branch alone would have.
+      do border = -1, 1, 2
+         call set_clearance(rule, pitch, place, border, side, x, gap)
+         do l = 1, lanes
+            beyond(l, border) = min(gap%s(l) + 0.5_wp*gap%p(l) + 0.25_wp*gap%q(l), gap%s(l) + gap%p(l) + gap%q(l), &
+                                    merge(min(4.0_wp*gap%q(l)*gap%s(l) - gap%p(l)*gap%p(l), 0.0_wp), 0.0_wp, &
+                                          gap%p(l) < 0.0_wp .and. gap%p(l) + 2.0_wp*gap%q(l) > 0.0_wp))
+            beyond(l, border) = merge(beyond(l, border), 1.0_wp, margin(l) < 0.0_wp)
+         end do
+         concerned(border) = minval(beyond(:, border)) < 0.0_wp
+      end do
       corrected = x
       do k = 1, corrections
          added = rest
          do border = -1, 1, 2
-            call find_beyond(rule, pitch, place, border, side, corrected, beyond)
-            if (.not. minval(beyond) < 0.0_wp) cycle
-            call part_beyond(rule, pitch, place, border, side, corrected, beyond, from, until)
-            call add_force(rule, pitch, place, border, side, corrected, from, until, added)
+            if (.not. concerned(border)) cycle
+            call set_clearance(rule, pitch, place, border, side, corrected, gap)
+            call set_part(gap, beyond(:, border), from, until)
+            call add_force(pitch, place, border, gap, from, until, added)
          end do
          call solve(rule, free_middle, free_end, slope, added, corrected, forces)
       end do
@@ -75,162 +97,120 @@ contains
       end do
       added_slope = 0.0_wp
       do border = -1, 1, 2
-         call find_beyond(rule, pitch, place, border, side, x, beyond)
-         do l = 1, lanes
-            beyond(l) = merge(beyond(l), 1.0_wp, margin(l) < 0.0_wp)
-         end do
-         if (.not. minval(beyond) < 0.0_wp) cycle
-         call reach(rule, pitch, place, border, side, x, beyond, smallest, largest)
+         if (.not. concerned(border)) cycle
+         call set_clearance(rule, pitch, place, border, side, x, gap)
+         call reach(border, pitch%half_backlash, gap, beyond(:, border), smallest, largest)
          if (.not. with_slope) cycle
-         call part_beyond(rule, pitch, place, border, side, x, beyond, from, until)
-         call add_slope(pitch, place, border, side, from, until, added_slope)
+         call set_part(gap, beyond(:, border), from, until)
+         call add_slope(pitch, place, gap, from, until, added_slope)
       end do
    end subroutine correct
 
-   !> A number for each lane that is negative where the deflection is beyond a border somewhere in the step.
-   pure subroutine find_beyond(rule, pitch, place, border, side, x, beyond)
+   !> Clearance to a border over a step, positive on the side on which the step begins.
+   pure subroutine set_clearance(rule, pitch, place, border, side, x, gap)
       !> Coefficients.
       type(lane_rule), intent(in) :: rule
       !> The mesh.
       type(mesh_cycle), intent(in) :: pitch
-      !> Index of the start of the step in the cycle.
-      integer, intent(in) :: place
-      !> Border: 1 working flank, -1 back flank.
-      integer, intent(in) :: border
-      !> Branch at the start.
-      real(wp), intent(in) :: side(lanes)
-      !> g.q at each point [m].
-      real(wp), intent(in) :: x(lanes, points)
-      !> The number.
-      real(wp), intent(out) :: beyond(lanes)
-
-      real(wp) :: s, p, q, sign_of, lowest
-      integer :: l
-
-      do l = 1, lanes
-         call clearance(rule, pitch, place, border, side, x, l, s, p, q, sign_of)
-         lowest = merge(min(4.0_wp*q*s - p*p, 0.0_wp), 0.0_wp, p < 0.0_wp .and. p + 2.0_wp*q > 0.0_wp)
-         beyond(l) = min(s + 0.5_wp*p + 0.25_wp*q, s + p + q, lowest)
-      end do
-   end subroutine find_beyond
-
-   !> The part of a step in which the deflection is beyond a border that it began before.
-   pure subroutine part_beyond(rule, pitch, place, border, side, x, beyond, from, until)
-      !> Coefficients.
-      type(lane_rule), intent(in) :: rule
-      !> The mesh.
-      type(mesh_cycle), intent(in) :: pitch
-      !> Index of the start of the step in the pitch.
-      integer, intent(in) :: place
-      !> Border: 1 working flank, -1 back flank.
-      integer, intent(in) :: border
-      !> Branch at the start.
-      real(wp), intent(in) :: side(lanes)
-      !> g.q at each point [m].
-      real(wp), intent(in) :: x(lanes, points)
-      !> Negative in the lanes that are beyond the border at all.
-      real(wp), intent(in) :: beyond(lanes)
-      !> The part, as shares of the step; both 1 where there is none.
-      real(wp), intent(out) :: from(lanes), until(lanes)
-
-      real(wp) :: s, p, q, root, w, first, second, turn, sign_of
-      integer :: l
-
-      do l = 1, lanes
-         call clearance(rule, pitch, place, border, side, x, l, s, p, q, sign_of)
-         root = p*p - 4.0_wp*q*s
-         w = -0.5_wp*(p + sign(sqrt(max(root, 0.0_wp)), p))
-         w = merge(w, 1.0_wp, abs(w) > no_curvature)
-         turn = merge(q, 1.0_wp, abs(q) > no_curvature)
-         first = merge(s/w, merge(w/turn, 1.0_wp, q < -no_curvature), p < 0.0_wp)
-         second = merge(w/turn, 1.0_wp, p < 0.0_wp .and. q > no_curvature)
-         first = merge(min(max(first, 0.0_wp), 1.0_wp), 1.0_wp, root > 0.0_wp .and. beyond(l) < 0.0_wp)
-         from(l) = first
-         until(l) = max(min(second, 1.0_wp), first)
-      end do
-   end subroutine part_beyond
-
-   !> How far the deflection of the lanes beyond a border turns between the points of the step.
-   pure subroutine reach(rule, pitch, place, border, side, x, beyond, smallest, largest)
-      !> Coefficients.
-      type(lane_rule), intent(in) :: rule
-      !> The mesh.
-      type(mesh_cycle), intent(in) :: pitch
-      !> Index of the start of the step in the cycle.
-      integer, intent(in) :: place
-      !> Border: 1 working flank, -1 back flank.
-      integer, intent(in) :: border
-      !> Branch at the start.
-      real(wp), intent(in) :: side(lanes)
-      !> g.q at each point [m].
-      real(wp), intent(in) :: x(lanes, points)
-      !> Negative in the lanes that are beyond the border.
-      real(wp), intent(in) :: beyond(lanes)
-      !> Extremes of the mesh deflection so far [m].
-      real(wp), intent(inout) :: smallest(lanes), largest(lanes)
-
-      real(wp) :: s, p, q, turn, sign_of, extreme
-      integer :: l
-
-      do l = 1, lanes
-         call clearance(rule, pitch, place, border, side, x, l, s, p, q, sign_of)
-         turn = merge(q, 1.0_wp, abs(q) > no_curvature)
-         extreme = merge(s - p*p/(4.0_wp*turn), s, p < 0.0_wp .and. p + 2.0_wp*q > 0.0_wp)
-         extreme = real(border, wp)*(sign_of*extreme + pitch%half_backlash)
-         smallest(l) = merge(min(smallest(l), extreme), smallest(l), beyond(l) < 0.0_wp)
-         largest(l) = merge(max(largest(l), extreme), largest(l), beyond(l) < 0.0_wp)
-      end do
-   end subroutine reach
-
-   !> Clearance to a border over a step, s + p u + q u^2, positive on the side on which the step begins.
-   pure subroutine clearance(rule, pitch, place, border, side, x, l, s, p, q, sign_of)
-      !$GCC$ ATTRIBUTES always_inline :: clearance
-      !> Coefficients.
-      type(lane_rule), intent(in) :: rule
-      !> The mesh.
-      type(mesh_cycle), intent(in) :: pitch
-      !> Index of the start of the step in the pitch, border, lane.
-      integer, intent(in) :: place, border, l
-      !> Branch at the start.
-      real(wp), intent(in) :: side(lanes)
-      !> g.q at each point [m].
-      real(wp), intent(in) :: x(lanes, points)
-      !> The parabola [m].
-      real(wp), intent(out) :: s, p, q
-      !> 1 where the step begins in contact at this border, -1 where not.
-      real(wp), intent(out) :: sign_of
-
-      real(wp) :: middle, end
-
-      sign_of = merge(1.0_wp, -1.0_wp, abs(side(l) - real(border, wp)) < 0.5_wp)
-      s = sign_of*(real(border, wp)*(rule%static(l) + pitch%error(place) + x(l, 1)) - pitch%half_backlash)
-      middle = sign_of*(real(border, wp)*(rule%static(l) + pitch%error(place + 1) + x(l, 2)) - pitch%half_backlash)
-      end = sign_of*(real(border, wp)*(rule%static(l) + pitch%error(place + 2) + x(l, 3)) - pitch%half_backlash)
-      p = 4.0_wp*middle - 3.0_wp*s - end
-      q = 2.0_wp*(s + end) - 4.0_wp*middle
-   end subroutine clearance
-
-   !> Add what the force at a border has too little, or take off what it has too much.
-   pure subroutine add_force(rule, pitch, place, border, side, x, from, until, added)
-      !> Coefficients.
-      type(lane_rule), intent(in) :: rule
-      !> The mesh.
-      type(mesh_cycle), intent(in) :: pitch
-      !> Index of the start of the step in the pitch, border.
+      !> Index of the start of the step in the cycle; border: 1 working flank, -1 back flank.
       integer, intent(in) :: place, border
       !> Branch at the start.
       real(wp), intent(in) :: side(lanes)
       !> g.q at each point [m].
       real(wp), intent(in) :: x(lanes, points)
+      !> The clearance.
+      type(parabola_type), intent(out) :: gap
+
+      real(wp) :: sign_of, start, middle, end, flank
+      integer :: l
+
+      flank = real(border, wp)
+      do l = 1, lanes
+         sign_of = merge(1.0_wp, -1.0_wp, abs(side(l) - flank) < 0.5_wp)
+         start = sign_of*(flank*(rule%static(l) + pitch%error(place) + x(l, 1)) - pitch%half_backlash)
+         middle = sign_of*(flank*(rule%static(l) + pitch%error(place + 1) + x(l, 2)) - pitch%half_backlash)
+         end = sign_of*(flank*(rule%static(l) + pitch%error(place + 2) + x(l, 3)) - pitch%half_backlash)
+         gap%begins(l) = sign_of
+         gap%s(l) = start
+         gap%p(l) = 4.0_wp*middle - 3.0_wp*start - end
+         gap%q(l) = 2.0_wp*(start + end) - 4.0_wp*middle
+      end do
+   end subroutine set_clearance
+
+   !> The part of a step in which the deflection is beyond a border that it began before.
+   pure subroutine set_part(gap, beyond, from, until)
+      !> Clearance.
+      type(parabola_type), intent(in) :: gap
+      !> Negative in the lanes that are beyond the border at all.
+      real(wp), intent(in) :: beyond(lanes)
+      !> The part, as shares of the step; both 1 where there is none.
+      real(wp), intent(out) :: from(lanes), until(lanes)
+
+      real(wp) :: s, p, q, root, w, first, second, turn
+      integer :: l
+
+      do l = 1, lanes
+         s = gap%s(l)
+         p = gap%p(l)
+         q = gap%q(l)
+         root = p*p - 4.0_wp*q*s
+         w = -0.5_wp*(p + sign(sqrt(max(root, 0.0_wp)), p))
+         w = merge(w, 1.0_wp, abs(w) > no_curvature)
+         turn = w/merge(q, 1.0_wp, abs(q) > no_curvature)
+         first = merge(s/w, merge(turn, 1.0_wp, q < -no_curvature), p < 0.0_wp)
+         second = merge(turn, 1.0_wp, p < 0.0_wp .and. q > no_curvature)
+         first = merge(min(max(first, 0.0_wp), 1.0_wp), 1.0_wp, root > 0.0_wp .and. beyond(l) < 0.0_wp)
+         from(l) = first
+         until(l) = max(min(second, 1.0_wp), first)
+      end do
+   end subroutine set_part
+
+   !> How far the deflection of the lanes beyond a border turns between the points of the step.
+   pure subroutine reach(border, half_backlash, gap, beyond, smallest, largest)
+      !> Border.
+      integer, intent(in) :: border
+      !> Half of the backlash [m].
+      real(wp), intent(in) :: half_backlash
+      !> Clearance.
+      type(parabola_type), intent(in) :: gap
+      !> Negative in the lanes that are beyond the border.
+      real(wp), intent(in) :: beyond(lanes)
+      !> Extremes of the mesh deflection so far [m].
+      real(wp), intent(inout) :: smallest(lanes), largest(lanes)
+
+      real(wp) :: s, p, q, extreme, flank
+      integer :: l
+
+      flank = real(border, wp)
+      do l = 1, lanes
+         s = gap%s(l)
+         p = gap%p(l)
+         q = gap%q(l)
+         extreme = merge(s - p*p/(4.0_wp*merge(q, 1.0_wp, abs(q) > no_curvature)), s, p < 0.0_wp .and. p + 2.0_wp*q > 0.0_wp)
+         extreme = flank*(gap%begins(l)*extreme + half_backlash)
+         smallest(l) = merge(min(smallest(l), extreme), smallest(l), beyond(l) < 0.0_wp)
+         largest(l) = merge(max(largest(l), extreme), largest(l), beyond(l) < 0.0_wp)
+      end do
+   end subroutine reach
+
+   !> Add what the force at a border has too little, or take off what it has too much.
+   pure subroutine add_force(pitch, place, border, gap, from, until, added)
+      !> The mesh.
+      type(mesh_cycle), intent(in) :: pitch
+      !> Index of the start of the step in the cycle, border.
+      integer, intent(in) :: place, border
+      !> Clearance.
+      type(parabola_type), intent(in) :: gap
       !> Part of the step.
       real(wp), intent(in) :: from(lanes), until(lanes)
       !> What is added to N [N].
       real(wp), intent(inout) :: added(lanes, points)
 
       real(wp), dimension(lanes) :: mean, tilt, bend
-      real(wp) :: s, p, q, k, kp, kq, u, value, sign_of
+      real(wp) :: k, kp, kq, u, value, flank
       integer :: l, g
 
+      flank = real(border, wp)
       k = pitch%stiffness(place)
       kp = 4.0_wp*pitch%stiffness(place + 1) - 3.0_wp*k - pitch%stiffness(place + 2)
       kq = 2.0_wp*(k + pitch%stiffness(place + 2)) - 4.0_wp*pitch%stiffness(place + 1)
@@ -239,36 +219,35 @@ contains
       bend = 0.0_wp
       do g = 1, gauss
          do l = 1, lanes
-            call clearance(rule, pitch, place, border, side, x, l, s, p, q, sign_of)
             u = from(l) + (until(l) - from(l))*gauss_place(g)
-            value = gauss_weight(g)*(until(l) - from(l))*(k + u*(kp + u*kq))*(s + u*(p + u*q))
+            value = gauss_weight(g)*(until(l) - from(l))*(k + u*(kp + u*kq))*(gap%s(l) + u*(gap%p(l) + u*gap%q(l)))
             mean(l) = mean(l) + value
             tilt(l) = tilt(l) + 3.0_wp*value*(2.0_wp*u - 1.0_wp)
             bend(l) = bend(l) + 5.0_wp*value*(1.0_wp - 6.0_wp*u*(1.0_wp - u))
          end do
       end do
       do l = 1, lanes
-         added(l, 1) = added(l, 1) - real(border, wp)*(mean(l) - tilt(l) + bend(l))
-         added(l, 2) = added(l, 2) - real(border, wp)*(mean(l) - 0.5_wp*bend(l))
-         added(l, 3) = added(l, 3) - real(border, wp)*(mean(l) + tilt(l) + bend(l))
+         added(l, 1) = added(l, 1) - flank*(mean(l) - tilt(l) + bend(l))
+         added(l, 2) = added(l, 2) - flank*(mean(l) - 0.5_wp*bend(l))
+         added(l, 3) = added(l, 3) - flank*(mean(l) + tilt(l) + bend(l))
       end do
    end subroutine add_force
 
    !> Derivative of what `add_force` adds by x at each point.
-   pure subroutine add_slope(pitch, place, border, side, from, until, slope)
+   pure subroutine add_slope(pitch, place, gap, from, until, slope)
       !> The mesh.
       type(mesh_cycle), intent(in) :: pitch
-      !> Index of the start of the step in the pitch, border.
-      integer, intent(in) :: place, border
-      !> Branch at the start.
-      real(wp), intent(in) :: side(lanes)
+      !> Index of the start of the step in the cycle.
+      integer, intent(in) :: place
+      !> Clearance.
+      type(parabola_type), intent(in) :: gap
       !> Part of the step.
       real(wp), intent(in) :: from(lanes), until(lanes)
       !> The derivative, added to.
       real(wp), intent(inout) :: slope(lanes, points, points)
 
       real(wp), dimension(lanes, points) :: row, column
-      real(wp) :: k, kp, kq, u, value, tilt, bend, sign_of
+      real(wp) :: k, kp, kq, u, value, tilt, bend
       integer :: l, g, i, j
 
       k = pitch%stiffness(place)
@@ -276,9 +255,8 @@ contains
       kq = 2.0_wp*(k + pitch%stiffness(place + 2)) - 4.0_wp*pitch%stiffness(place + 1)
       do g = 1, gauss
          do l = 1, lanes
-            sign_of = 1.0_wp - 2.0_wp*merge(1.0_wp, 0.0_wp, abs(side(l) - real(border, wp)) < 0.5_wp)
             u = from(l) + (until(l) - from(l))*gauss_place(g)
-            value = sign_of*gauss_weight(g)*(until(l) - from(l))*(k + u*(kp + u*kq))
+            value = -gap%begins(l)*gauss_weight(g)*(until(l) - from(l))*(k + u*(kp + u*kq))
             tilt = 3.0_wp*(2.0_wp*u - 1.0_wp)
             bend = 5.0_wp*(1.0_wp - 6.0_wp*u*(1.0_wp - u))
             row(l, 1) = value*(1.0_wp - tilt + bend)

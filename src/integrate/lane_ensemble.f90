@@ -7,7 +7,7 @@ module spurflex_integrate_lane_ensemble
       point_rule, new_point_rule, new_mesh_cycle, load_rule
    use spurflex_integrate_lane_step, only: advance_lanes, carry_lane_tangents
    use spurflex_model_equations, only: equations_type
-   use spurflex_model_modal, only: modal_system, state_weights
+   use spurflex_model_modal, only: modal_system
    implicit none
    private
 
@@ -26,7 +26,7 @@ module spurflex_integrate_lane_ensemble
       type(lane_record) :: record
       !> Coefficients of each point, of the seats, and the mesh.
       type(point_rule), allocatable, private :: rules(:)
-      type(lane_rule), private :: rule
+      type(lane_rule), allocatable, private :: rule
       type(mesh_cycle), private :: pitch
       !> Derivatives over the latest period.
       type(lane_gain), private :: gain
@@ -60,6 +60,7 @@ contains
       self%size = 2*modes
       self%half_backlash = equations(1)%mesh%half_backlash
       if (.not. allocated(self%smallest)) allocate (self%smallest(lanes), self%largest(lanes), source=0.0_wp)
+      if (.not. allocated(self%rule)) allocate (self%rule)
       call reserve(self, steps)
       self%steps = steps
       self%record%middles = self%with_middles .and. .not. self%by_newmark
@@ -73,7 +74,7 @@ contains
          else
             call new_point_rule(modal(part(i)), equations(i), steps, self%rules(i))
          end if
-         self%weight(:, i) = widen(state_weights(modal(part(i))), modes)
+         self%weight(:, i) = widen(modal(part(i))%weight, modes)
       end do
       ! An empty lane follows the first point.
       self%rule%modes = modes

@@ -24,8 +24,7 @@ module spurflex_integrate_lane_observe
    !> The same of all seats, and what is seen.
    type :: lane_view
       private
-      real(wp), dimension(lanes, most_modes, observables, orders) :: re = 0.0_wp, im = 0.0_wp
-      real(wp) :: force(lanes, observables, orders) = 0.0_wp
+      real(wp), allocatable :: re(:, :, :, :), im(:, :, :, :), force(:, :, :)
       !> Values, rates and accelerations, shape (lanes, displacements, orders, 0:2 steps).
       real(wp), allocatable :: seen(:, :, :, :)
    end type lane_view
@@ -43,12 +42,16 @@ contains
       integer :: i, order
 
       do i = 1, observables
+         ! What the mesh force does to the rate and to the acceleration; its own rate does not reach those of a position.
+         factor = modal%observation(i, :)
+         do order = 2, orders
+            view%force(i, order) = -real(sum(factor*modal%influence), wp)
+            factor = factor*modal%rate
+         end do
          factor = modal%observation(i, :)
          do order = 1, orders
             view%re(:modal%modes, i, order) = real(factor, wp)
             view%im(:modal%modes, i, order) = aimag(factor)
-            ! The rate of N does not reach the acceleration of a position.
-            if (order < orders) view%force(i, order + 1) = -real(sum(factor*modal%influence), wp)
             factor = factor*modal%rate
          end do
       end do
@@ -63,6 +66,9 @@ contains
       !> View of the point.
       type(point_view), intent(in) :: view
 
+      if (.not. allocated(self%re)) allocate (self%re(lanes, most_modes, observables, orders), &
+                                              self%im(lanes, most_modes, observables, orders), &
+                                              self%force(lanes, observables, orders), source=0.0_wp)
       self%re(lane, :, :, :) = view%re
       self%im(lane, :, :, :) = view%im
       self%force(lane, :, :) = view%force

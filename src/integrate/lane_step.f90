@@ -109,11 +109,18 @@ contains
 
       call copy_rule(rule, r)
       m = r%modes
-      do c = 2, count, 2
-         call carry_two(r, steps, gain, tangents(:, c - 1, :m), tangents(:, c - 1, m + 1:), tangents(:, c, :m), &
-                        tangents(:, c, m + 1:))
-      end do
-      if (mod(count, 2) == 1) call carry_one(r, steps, gain, tangents(:, count, :m), tangents(:, count, m + 1:))
+      ! A full set goes in pairs of the real and the imaginary part of a mode: which tangents go together does not depend on how
+      ! many modes there is room for.
+      if (count == 2*m) then
+         do c = 1, m
+            call carry_two(r, steps, gain, tangents(:, c, :m), tangents(:, c, m + 1:), tangents(:, m + c, :m), &
+                           tangents(:, m + c, m + 1:))
+         end do
+      else
+         do c = 1, count
+            call carry_one(r, steps, gain, tangents(:, c, :m), tangents(:, c, m + 1:))
+         end do
+      end if
    end subroutine carry_lane_tangents
 
    !> Carry two tangents: they read the coefficients together.

@@ -31,9 +31,6 @@ module spurflex_integrate_steps
    !> Most steps to begin with, and most by which a tolerance is met, in lanes.
    integer, parameter :: most_lane_steps = 1024, most_refined_steps = 192, most_newmark_steps = 16384
 
-   !> Share of what gives way to the mesh force from which on a mode is felt.
-   real(wp), parameter :: felt_share = 0.02_wp
-
    !> Order of collocation in lanes.
    real(wp), parameter :: lane_order = 4.0_wp
 
@@ -98,16 +95,13 @@ contains
       !> Steps per mesh period; more than `most_lane_steps` where lanes are no use.
       integer :: steps
 
-      real(wp) :: give(modal%modes), fastest, finer
+      real(wp) :: finer
       integer :: harmonics
 
-      ! The mesh feels the modes in the measure in which they give way to it; the others follow at once.
-      give = abs(modal%influence/modal%rate)
-      fastest = maxval(abs(modal%rate), mask=give >= felt_share*sum(give))
       harmonics = max(size(equations%mesh%stiffness_coefficients), size(equations%mesh%error_amplitudes))
       ! The steps that find a motion need not meet the tolerance on it, but who asks for more wants to be surer of it.
       finer = max(lane_tolerance/tolerance, 1.0_wp)**(0.5_wp/lane_order)
-      steps = next_lane_steps(finer*max(2.0_wp*pi*max(fastest/equations%frequency, real(harmonics, wp))/lane_phase, &
+      steps = next_lane_steps(finer*max(2.0_wp*pi*max(modal%fastest/equations%frequency, real(harmonics, wp))/lane_phase, &
                                         real(lane_steps(1), wp)))
    end function first_lane_steps
 

@@ -9,6 +9,7 @@ module spurflex_measure_points
    use spurflex_integrate_lane_ensemble, only: widen, narrow
    use spurflex_integrate_options, only: solver_options, integrator_collocation, integrator_newmark
    use spurflex_integrate_steps, only: first_lane_steps, most_lane_steps, most_newmark_steps
+   use spurflex_measure_effort, only: effort_type, stage_search, stage_measure, stage_alone
    use spurflex_measure_lane_solver, only: lane_solver, find_part, measure_orbits, measure_windows
    use spurflex_measure_point, only: point_solver, new_point_solver, respond_alone
    use spurflex_measure_response, only: response, empty_response
@@ -29,6 +30,8 @@ module spurflex_measure_points
       type(lane_solver) :: lanes
       !> Solves points one after the other.
       type(point_solver) :: alone
+      !> What the points cost.
+      type(effort_type), public :: effort
    end type solver_type
 
 contains
@@ -99,16 +102,22 @@ contains
             if (steps(i) > most_lane_steps .or. any(steps(:i - 1) == steps(i))) cycle
             group = pack([(k, k=1, size(equations))], steps == steps(i))
             call respond_in_lanes(solver%lanes, equations(group), part(group), steps(i), positions, velocities, group, visitor, &
-                                  motions, answers, done)
+                                  solver%effort, motions, answers, done)
          end do
       end if
       do i = 1, size(equations)
-         if (done(i)) cycle
+         if (done(i)) then
+            call solver%effort%count_point(answers(i), motions(i)%periods > 0, alone=.false.)
+            cycle
+         end if
+         call solver%effort%begin()
          position = positions(:, i)
          velocity = velocities(:, i)
          call respond_alone(solver%alone, equations(i), position, velocity, visitor, motions(i), answers(i))
          positions(:, i) = position
          velocities(:, i) = velocity
+         call solver%effort%end(stage_alone)
+         call solver%effort%count_point(answers(i), motions(i)%periods > 0, alone=.true.)
       end do
    end subroutine respond
 
@@ -135,7 +144,8 @@ contains
    end function is_average
 
    !> Find motions in lanes, and measure them there as far as lanes meet the tolerance.
-   subroutine respond_in_lanes(solver, equations, part, steps, positions, velocities, group, visitor, motions, answers, done)
+   subroutine respond_in_lanes(solver, equations, part, steps, positions, velocities, group, visitor, effort, motions, &
+                               answers, done)
       !> Solver.
       type(lane_solver), intent(inout) :: solver
       !> Equations of motion of each point of the group, shape (n).
@@ -150,6 +160,8 @@ contains
       integer, intent(in) :: group(:)
       !> Let in now and then.
       class(attendant), intent(inout) :: visitor
+      !> What the points cost.
+      type(effort_type), intent(inout) :: effort
       !> Motion of every point; its status remains `status_missing` if it must be found by other means.
       type(steady_motion), intent(inout) :: motions(:)
       !> Response of every point.
@@ -164,6 +176,7 @@ contains
       logical :: complete(size(group))
       integer :: i
 
+      call effort%begin()
       ! Steps that are given choose the motion too; free ones are chosen to measure it, and collocation finds it.
       solver%steps = steps
       solver%points%by_newmark = solver%options%steps_per_period > 0
@@ -175,6 +188,7 @@ contains
                               solver%points%size/2)
       end do
       call find_steady_motions(solver%points, starts, solver%options, visitor, found, orbits)
+      call effort%end(stage_search)
       complete = .false.
       measured = empty_response()
       if (solver%options%integrator == integrator_collocation .or. is_average(solver%options)) then
@@ -183,6 +197,7 @@ contains
          call measure_orbits(solver, equations, part, pack([(i, i=1, size(group))], found%periods > 0), visitor, found, orbits, &
                              measured, complete)
       end if
+      call effort%end(stage_measure)
       do i = 1, size(group)
          ! What diverges in lanes may have had too few steps.
          if (found(i)%status == status_diverged) cycle

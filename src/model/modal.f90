@@ -16,7 +16,7 @@ module spurflex_model_modal
    private
 
    public :: modal_system, new_modal_system, same_modes
-   public :: state_weights, to_modes, from_modes, sum_of_moduli
+   public :: to_modes, from_modes, sum_of_moduli
 
    !> Share of the largest mode below which the mesh does not drive a mode: the square of round-off, for the mesh must neither
    !> drive it nor feel it.
@@ -24,6 +24,9 @@ module spurflex_model_modal
 
    !> Round-off of a well-conditioned mode after a mesh period, in units of the machine's.
    real(wp), parameter :: roundoff_units = 64.0_wp
+
+   !> Share of what gives way to the mesh force from which on a mode is felt.
+   real(wp), parameter :: felt_share = 0.02_wp
 
    !> The linear part in its modes.
    type :: modal_system
@@ -39,6 +42,11 @@ module spurflex_model_modal
       complex(wp), allocatable :: influence(:)
       !> y1, d_x1, d_y1, d_x2, d_y2 are the real part of this times z, shape (5, modes).
       complex(wp), allocatable :: observation(:, :)
+      !> What a component of a state, real parts of the modes and then imaginary parts, counts for in a norm in metres: the
+      !> largest displacement of its mode, the mesh deflection included, shape (2 modes).
+      real(wp), allocatable :: weight(:)
+      !> Rate of the fastest mode that the mesh feels: of those that give way to it, the others follow at once [1/s].
+      real(wp) :: fastest = 0.0_wp
       !> z = this times [q, q'], shape (modes, 2 n).
       complex(wp), allocatable :: to_modes(:, :)
       !> [q, q'] is the real part of this times z, shape (2 n, modes).
@@ -109,6 +117,13 @@ contains
                                                                j=1, modal%modes)])
       modal%influence = matmul(modal%to_modes(:, n + 1:), drive)
       modal%observation = matmul(equations%observation, modal%from_modes(:n, :))
+      allocate (modal%weight(2*modal%modes))
+      do j = 1, modal%modes
+         modal%weight([j, modal%modes + j]) = max(1.0_wp, maxval(abs(modal%observation(:, j))))
+      end do
+      associate (give => abs(modal%influence/modal%rate))
+         modal%fastest = maxval(abs(modal%rate), mask=give >= felt_share*sum(give))
+      end associate
    end subroutine new_modal_system
 
    !> Leave out what the mesh does not drive.
@@ -135,26 +150,14 @@ contains
       !> The modes of one are those of the other.
       logical :: same
 
+      ! Neighbours on the grid differ in the stiffness, if at all.
       same = a%n == b%n
-      if (same) same = .not. (any(abs(a%stiffness - b%stiffness) > 0.0_wp) .or. any(abs(a%damping - b%damping) > 0.0_wp) &
+      if (same) same = .not. any(abs(a%stiffness - b%stiffness) > 0.0_wp)
+      if (same) same = .not. (any(abs(a%damping - b%damping) > 0.0_wp) &
                               .or. any(abs(a%mass - b%mass) > 0.0_wp) .or. any(abs(a%direction - b%direction) > 0.0_wp) &
                               .or. abs(a%mesh%mean_stiffness - b%mesh%mean_stiffness) > 0.0_wp &
                               .or. abs(a%mesh%damping - b%mesh%damping) > 0.0_wp)
    end function same_modes
-
-   !> What a component of a state, real parts of the modes and then imaginary parts, counts for in a norm in metres.
-   pure function state_weights(modal) result(weight)
-      !> Modes.
-      type(modal_system), intent(in) :: modal
-      !> Largest displacement of each mode, the mesh deflection included, shape (2 modes).
-      real(wp) :: weight(2*modal%modes)
-
-      integer :: k
-
-      do k = 1, modal%modes
-         weight([k, modal%modes + k]) = max(1.0_wp, maxval(abs(modal%observation(:, k))))
-      end do
-   end function state_weights
 
    !> The modes from the coordinates of the equations of motion.
    pure function to_modes(modal, position, velocity) result(state)

@@ -10,6 +10,9 @@ module spurflex_steady_batch
    !> Matrices in a batch.
    integer, parameter :: batch = 8
 
+   !> Logarithm of the norm of a power beyond which it will not shrink any more: no physical matrix is that far from normal.
+   real(wp), parameter :: hopeless = 1000.0_wp
+
    !> Squarings after which a matrix whose powers do not shrink counts as one that does not contract: the largest multiplier is
    !> then within 1e-9 of one, or beyond it.
    integer, parameter :: most_squarings = 32
@@ -125,13 +128,21 @@ contains
          end do
          do l = 1, batch
             ! What is not finite never contracts; a power that vanishes has done so.
-            if (.not. norm(l) < huge(1.0_wp)) logarithm(l) = huge(1.0_wp)
-            if (.not. norm(l) > tiny(1.0_wp)) logarithm(l) = -1.0_wp
-            if (abs(logarithm(l)) < 0.5_wp*huge(1.0_wp)) logarithm(l) = 2.0_wp*logarithm(l) + 0.5_wp*log(max(norm(l), tiny(1.0_wp)))
-            norm(l) = merge(1.0_wp/sqrt(norm(l)), 0.0_wp, norm(l) > tiny(1.0_wp) .and. norm(l) < huge(1.0_wp))
+            if (logarithm(l) >= hopeless) then
+               norm(l) = 0.0_wp
+            else if (.not. norm(l) < huge(1.0_wp)) then
+               logarithm(l) = huge(1.0_wp)
+               norm(l) = 0.0_wp
+            else if (.not. norm(l) > tiny(1.0_wp)) then
+               logarithm(l) = -1.0_wp
+               norm(l) = 0.0_wp
+            else
+               logarithm(l) = 2.0_wp*logarithm(l) + 0.5_wp*log(norm(l))
+               norm(l) = 1.0_wp/sqrt(norm(l))
+            end if
          end do
          it_does = it_does .or. logarithm < 0.0_wp
-         if (all(it_does .or. logarithm >= 0.5_wp*huge(1.0_wp))) exit
+         if (all(it_does .or. logarithm >= hopeless)) exit
          do j = 1, n
             do i = 1, n
                do l = 1, batch

@@ -49,6 +49,9 @@ module spurflex_steady_search
    !> few units. Over T periods an exponent below this over T is therefore called zero.
    real(wp), parameter :: neutral_growth = 10.0_wp
 
+   !> Share of the last watch that counts as all of it: blocks of growth that are not full are left out.
+   real(wp), parameter :: whole_watch = 0.9_wp
+
    !> Mesh periods over which a motion that is called quasi-periodic must have been watched.
    integer, parameter :: fewest_periods = 512
 
@@ -103,15 +106,19 @@ contains
       next_look = first_look
       do
          call look_for_orbits(points, left, options, visitor, transients, motions, orbits)
+         do i = 1, size(left)
+            if (motions(left(i))%status /= status_missing .or. .not. transients(left(i))%sound) cycle
+            call classify(transients(left(i)), options%max_periods, motions(left(i)))
+         end do
          left = pack(left, motions(left)%status == status_missing .and. transients(left)%sound &
                      .and. transients(left)%periods < options%max_periods)
          if (size(left) == 0) exit
          if (next_look <= options%max_periods) then
-            ! Only the last watch decides on the class; in the one before it a tangent takes its own direction.
+            ! A tangent takes its own direction in the watch before the first one that can decide on the class.
             is_last = 2*next_look > options%max_periods
             do i = 1, size(left)
                call watch_from_now(transients(left(i)), merge(options%max_periods, next_look, is_last), &
-                                   grows=4*next_look > options%max_periods)
+                                   grows=next_look >= fewest_periods/2)
             end do
          end if
          call advance_transients(points, left, spread(min(next_look, options%max_periods), 1, size(left)), transients, visitor)
@@ -121,7 +128,6 @@ contains
          motions(i)%periods_integrated = motions(i)%periods_integrated + transients(i)%periods
          if (motions(i)%periods > 0) cycle
          motions(i)%state = transients(i)%state
-         if (transients(i)%sound .and. motions(i)%status == status_missing) call classify(transients(i), motions(i))
          if (motions(i)%status /= status_missing) cycle
          motions(i)%motion = motion_unresolved
          motions(i)%status = merge(status_not_settled, status_diverged, transients(i)%sound)
@@ -299,10 +305,31 @@ contains
                 (size_of_miss <= follows_distance*weighted_norm(weight, away) .and. size_of_miss <= follows_size*size_of_motion)
    end function follows
 
+   !> Mesh periods over which a motion is watched the last time, if nothing was found before.
+   pure function last_watch(most_periods) result(periods)
+      !> Most periods.
+      integer, intent(in) :: most_periods
+      !> The periods.
+      integer :: periods
+
+      integer :: look
+
+      look = first_look
+      do while (2*look <= most_periods)
+         look = 2*look
+      end do
+      periods = most_periods - look/2
+   end function last_watch
+
    !> The class of a motion in which nothing periodic was found; its status remains `status_missing` where it cannot be told.
-   pure subroutine classify(transient, motion)
+   !>
+   !> Whatever the periods watched, an exponent is called zero to the same resolution, that of the last watch: a tangent whose
+   !> growth wanders less than that in a shorter watch need not be watched longer.
+   pure subroutine classify(transient, most_periods, motion)
       !> The transient.
       type(transient_type), intent(in) :: transient
+      !> Most periods; chaos is watched as long, for the sake of its exponent.
+      integer, intent(in) :: most_periods
       !> The motion.
       type(steady_motion), intent(inout) :: motion
 
@@ -310,14 +337,15 @@ contains
       integer :: periods
 
       call transient%growth%exponent(motion%lyapunov_exponent, motion%lyapunov_error, periods, wander)
+      if (periods < fewest_periods) return
       neutral = neutral_growth/real(max(periods, 1), wp)
-      motion%status = status_settled
       if (motion%lyapunov_exponent > neutral + significance*motion%lyapunov_error) then
          motion%motion = motion_chaotic
-      else if (wander <= neutral_growth .and. periods >= fewest_periods .and. .not. drifts(transient)) then
+         if (transient%periods >= most_periods) motion%status = status_settled
+      else if (wander <= neutral_growth*min(real(periods, wp)/(whole_watch*real(last_watch(most_periods), wp)), 1.0_wp) &
+               .and. .not. drifts(transient)) then
          motion%motion = motion_quasi_periodic
-      else
-         motion%status = status_missing
+         motion%status = status_settled
       end if
    end subroutine classify
 

@@ -120,6 +120,9 @@ contains
                if (transient%sound .and. transient%periods < until(seated(k))) cycle
                transient%tangent = tangents(k, 1, :)
                seated(k) = 0
+               ! An empty seat goes on from where nothing can overflow.
+               states(k, :) = 0.0_wp
+               tangents(k, 1, :) = 0.0_wp
             end associate
          end do
          call visitor%attend()

@@ -13,6 +13,7 @@ module spurflex_sweep_driver
    use spurflex_io_log, only: logger
    use spurflex_io_provenance, only: provenance_type, collect_provenance
    use spurflex_io_results, only: results_file, create_results, open_results, close_results, read_status, read_rigid
+   use spurflex_measure_effort, only: effort_type
    use spurflex_measure_response, only: response, status_missing, status_diverged
    use spurflex_sweep_attendance, only: outcome_text
    use spurflex_sweep_plan, only: chunk_type, plan_row, plan_grid, describe_plan
@@ -113,16 +114,18 @@ contains
          !> Name of the support.
          character(len=*), intent(in) :: support
 
+         type(effort_type) :: effort
          integer :: finished(outcomes)
 
          call log%begin(support//': '//to_text(sum(chunks%rows*chunks%count))//' points on '//to_text(ranks)//' ranks')
-         call work_on_chunks(case, chunks, comm, results, log, rigid_deformation, finished, error)
+         call work_on_chunks(case, chunks, comm, results, log, rigid_deformation, finished, effort, error)
          if (allocated(error)) then
             error%alone = .true.
             return
          end if
          call mpi_bcast(finished, outcomes, MPI_INTEGER, 0, comm)
          total = total + finished
+         call log%say(effort%describe())
          left = left + sum(chunks%rows*chunks%count) - sum(finished)
       end subroutine work_through
 

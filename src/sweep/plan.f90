@@ -92,11 +92,12 @@ contains
 
       missing = count(status == status_missing)
       length = max(1, min(smallest_chunk, missing/ranks), min(largest_chunk, missing/(ranks*chunks_per_rank)))
-      height = max(1, min(nint(sqrt(real(length))), size(status, 2)))
-      width = length/height
+      width = max(1, min(nint(sqrt(real(length))), size(status, 1)))
+      height = max(1, min(length/width, size(status, 2)))
+      width = max(1, min(length/height, size(status, 1)))
       if (is_chained(case)) then
          height = max(1, min(smallest_chunk, size(status, 2)/ranks))
-         width = size(status, 1)
+         width = max(1, size(status, 1))
       end if
       allocate (found(size(status)))
       n = 0
@@ -194,6 +195,8 @@ contains
       end associate
       if (.not. (case%sweep%rigid .and. case%sweep%flexible)) text = text//newline// &
          'skipped: eta, which needs both supports'
+      if (.not. any(case%output%products == 'floquet' .or. case%output%products == 'lyapunov')) text = text//newline// &
+         'skipped: Floquet multipliers, which no product asks for; stability is decided without them'
       select case (case%solver%start)
       case (start_rest)
          start = 'from rest, every point on its own'

@@ -1,6 +1,6 @@
 !> One rank's work: take a chunk, solve its points, write it, take the next.
 module spurflex_sweep_worker
-   use mpi_f08, only: MPI_Comm
+   use mpi_f08, only: MPI_Comm, MPI_INTEGER8, MPI_DOUBLE_PRECISION, MPI_SUM, mpi_reduce
    use spurflex_base_error, only: error_type
    use spurflex_base_kinds, only: wp, i8
    use spurflex_integrate_options, only: solver_options, start_rest, start_down
@@ -8,6 +8,7 @@ module spurflex_sweep_worker
    use spurflex_io_case, only: case_type
    use spurflex_io_log, only: logger
    use spurflex_io_results, only: results_file, write_rigid, write_flexible
+   use spurflex_measure_effort, only: effort_type, ways, stages
    use spurflex_measure_points, only: solver_type, new_solver, respond
    use spurflex_measure_response, only: response, nan, status_diverged
    use spurflex_model_equations, only: equations_type, new_equations, rest_deviation
@@ -26,7 +27,7 @@ module spurflex_sweep_worker
 contains
 
    !> Solve the points of chunks as long as there are any. All ranks call this together.
-   subroutine work_on_chunks(case, chunks, comm, results, log, rigid_deformation, total, error)
+   subroutine work_on_chunks(case, chunks, comm, results, log, rigid_deformation, total, effort, error)
       !> Case.
       type(case_type), intent(in) :: case
       !> Chunks, the same on every rank.
@@ -42,11 +43,13 @@ contains
       real(wp), allocatable, intent(inout) :: rigid_deformation(:, :)
       !> On rank 0: points by status on all ranks, shape (outcomes).
       integer, intent(out) :: total(:)
+      !> On rank 0: what the points cost on all ranks.
+      type(effort_type), intent(out) :: effort
       !> Set where a chunk cannot be written.
       type(error_type), allocatable, intent(out) :: error
 
       type(sweep_attendant) :: visitor
-      type(solver_type) :: solver
+      type(solver_type), allocatable :: solver
       type(solver_options) :: options
       type(response), allocatable :: responses(:)
       integer :: number, i
@@ -57,6 +60,7 @@ contains
       call new_scheduler(visitor%schedule, comm, size(chunks))
       options = case%solver
       options%multipliers = any(case%output%products == 'floquet' .or. case%output%products == 'lyapunov')
+      allocate (solver)
       call new_solver(options, solver)
       do
          call visitor%schedule%take(number, available)
@@ -72,6 +76,9 @@ contains
       end do
       call visitor%schedule%finish()
       total = visitor%schedule%total
+      effort = effort_type()
+      call mpi_reduce(solver%effort%points, effort%points, ways, MPI_INTEGER8, MPI_SUM, 0, comm)
+      call mpi_reduce(solver%effort%seconds, effort%seconds, stages, MPI_DOUBLE_PRECISION, MPI_SUM, 0, comm)
    end subroutine work_on_chunks
 
    !> Solve the points of a chunk.

@@ -39,12 +39,13 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       real(wp), parameter :: longest = 60.0_wp
-      type(solver_type) :: solver
+      type(solver_type), allocatable :: solver
       type(no_attendant) :: nobody
       real(wp) :: begin, end
 
       allocate (position(equations%n), velocity(equations%n), source=0.0_wp)
       call cpu_time(begin)
+      allocate (solver)
       call new_solver(options, solver)
       call respond_one(solver, equations, position, velocity, nobody, answer)
       call cpu_time(end)

@@ -3,6 +3,7 @@
 program unit_tests
    use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
    use mpi_f08, only: MPI_Allreduce, MPI_COMM_WORLD, MPI_Finalize, MPI_Init, MPI_INTEGER, MPI_SUM
+   use test_batch, only: collect_batch
    use test_collocation, only: collect_collocation
    use test_contact, only: collect_contact
    use test_deck, only: collect_deck
@@ -20,6 +21,7 @@ program unit_tests
    use test_shooting, only: collect_shooting
    use test_search, only: collect_search
    use test_kahraman_singh, only: collect_kahraman_singh
+   use test_lanes, only: collect_lanes
    use test_support, only: new_testsuite, run_testsuite, select_suite, testsuite_type
    use test_text, only: collect_text
    implicit none
@@ -47,7 +49,9 @@ program unit_tests
             new_testsuite('crossings', collect_crossings), &
             new_testsuite('shooting', collect_shooting), &
             new_testsuite('search', collect_search), &
-            new_testsuite('kahraman_singh', collect_kahraman_singh) &
+            new_testsuite('kahraman_singh', collect_kahraman_singh), &
+            new_testsuite('lanes', collect_lanes), &
+            new_testsuite('batch', collect_batch) &
             ]
 
    call MPI_Init()

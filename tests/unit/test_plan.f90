@@ -2,6 +2,7 @@
 module test_plan
    use pseudo_random, only: random_stream
    use spurflex_base_kinds, only: i8
+   use spurflex_base_text, only: to_text
    use spurflex_integrate_options, only: start_down, start_rest, start_static, start_up
    use spurflex_io_case, only: case_type
    use spurflex_measure_response, only: status_diverged, status_missing, status_not_settled, status_settled
@@ -14,6 +15,9 @@ module test_plan
 
    integer, parameter :: done(3) = [status_settled, status_not_settled, status_diverged]
 
+   !> Most points in a chunk that is not chained, and rows of a square tile of so many.
+   integer, parameter :: largest_chunk = 128, tallest_tile = 11
+
 contains
 
    !> The tests of this suite.
@@ -24,6 +28,8 @@ contains
       testsuite = [ &
                   new_unittest('starts that chain points', test_chained), &
                   new_unittest('chunks cover the missing points once', test_cover), &
+                  new_unittest('no chunk is larger than it may be', test_sizes), &
+                  new_unittest('neighbouring missing points make tiles', test_tiles), &
                   new_unittest('chained rows are whole', test_rows), &
                   new_unittest('softest support first', test_order), &
                   new_unittest('the rigid support is row 0', test_rigid), &
@@ -69,13 +75,14 @@ contains
       times = 0
       do c = 1, size(chunks)
          associate (chunk => chunks(c))
-            if (chunk%row < 1 .or. chunk%row > rows .or. chunk%first < 1 .or. chunk%count < 1 &
+            if (min(chunk%row, chunk%rows, chunk%first, chunk%count) < 1 .or. chunk%row + chunk%rows - 1 > rows &
                 .or. chunk%first + chunk%count - 1 > speeds) then
                times = -1
                return
             end if
-            times(chunk%first:chunk%first + chunk%count - 1, chunk%row) = &
-               times(chunk%first:chunk%first + chunk%count - 1, chunk%row) + 1
+            associate (tile => times(chunk%first:chunk%first + chunk%count - 1, chunk%row:chunk%row + chunk%rows - 1))
+               tile = tile + 1
+            end associate
          end associate
       end do
    end function covered
@@ -107,21 +114,104 @@ contains
       integer, allocatable :: status(:, :)
       integer :: i, speeds, rows, share, ranks
 
-      case%solver%start = start_static
       random = random_stream(31_i8)
-      do i = 1, 300
-         call random%pick(1, 90, speeds)
-         call random%pick(1, 12, rows)
+      do i = 1, 1000
+         case%solver%start = merge(start_static, start_rest, mod(i, 2) == 0)
+         call random%pick(1, merge(400, 90, mod(i, 7) == 0), speeds)
+         call random%pick(1, merge(60, 12, mod(i, 5) == 0), rows)
          call random%pick(0, 10, share)
-         call random%pick(1, 9, ranks)
+         call random%pick(1, 40, ranks)
          call draw(random, speeds, rows, share, status)
+         if (mod(i, 3) == 0) call punch(random, status)
          call check(error, all(covered(plan_grid(case, status, ranks), speeds, rows) &
-                               == merge(1, 0, status == status_missing)))
+                               == merge(1, 0, status == status_missing)), to_text(speeds)//' speeds, '//to_text(rows) &
+                    //' rows, '//to_text(ranks)//' ranks')
          if (allocated(error)) return
       end do
    end subroutine test_cover
 
-   !> A row of which any point is missing is one chunk; others are none.
+   !> A grid of which only a rectangle is done, or missing: what an interrupted run leaves.
+   subroutine punch(random, status)
+      !> Random numbers.
+      type(random_stream), intent(inout) :: random
+      !> Status of each point.
+      integer, intent(inout) :: status(:, :)
+
+      integer :: i(2), j(2), kind
+
+      call random%pick(1, size(status, 1), i(1))
+      call random%pick(i(1), size(status, 1), i(2))
+      call random%pick(1, size(status, 2), j(1))
+      call random%pick(j(1), size(status, 2), j(2))
+      call random%pick(1, 2, kind)
+      status = merge(status_missing, status_settled, kind == 1)
+      status(i(1):i(2), j(1):j(2)) = merge(status_settled, status_missing, kind == 1)
+   end subroutine punch
+
+   !> Large grids, of which much is missing, on few ranks.
+   subroutine test_sizes(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      type(case_type) :: case
+      type(random_stream) :: random
+      integer, allocatable :: status(:, :)
+      integer :: i, speeds, rows, share, ranks
+
+      random = random_stream(53_i8)
+      case%solver%start = start_static
+      do i = 1, 300
+         call random%pick(1, 600, speeds)
+         call random%pick(1, 100, rows)
+         call random%pick(5, 10, share)
+         call random%pick(1, 8, ranks)
+         call draw(random, speeds, rows, share, status)
+         associate (chunks => plan_grid(case, status, ranks))
+            if (size(chunks) == 0) cycle
+            call check(error, maxval(chunks%rows*chunks%count) <= largest_chunk, 'largest chunk')
+            if (allocated(error)) return
+            call check(error, maxval(chunks%rows) <= tallest_tile, 'tallest tile')
+            if (allocated(error)) return
+         end associate
+      end do
+   end subroutine test_sizes
+
+   !> A grid of which nothing is done is cut into few tiles, nearly square where there are rows enough.
+   subroutine test_tiles(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      !> Points in a chunk at least, in the mean: enough for a vector of the processor.
+      integer, parameter :: fewest = 4
+      integer, parameter :: speeds(4) = [1, 64, 571, 3000], rows(4) = [1, 3, 61, 300]
+      type(case_type) :: case
+      integer, allocatable :: status(:, :)
+      integer :: i, k, ranks
+
+      case%solver%start = start_static
+      do k = 1, size(rows)
+         do i = 1, size(speeds)
+            allocate (status(speeds(i), rows(k)), source=status_missing)
+            do ranks = 1, 17, 4
+               associate (chunks => plan_grid(case, status, ranks))
+                  call check(error, all(covered(chunks, speeds(i), rows(k)) == 1), 'cover')
+                  if (allocated(error)) return
+                  if (size(status) < 8*fewest*ranks) cycle
+                  call check(error, size(chunks)*fewest <= size(status), to_text(speeds(i))//' speeds, '//to_text(rows(k)) &
+                             //' rows, '//to_text(ranks)//' ranks: '//to_text(size(chunks))//' chunks')
+                  if (allocated(error)) return
+                  if (min(speeds(i), rows(k)) < tallest_tile) cycle
+                  call check(error, maxval(chunks%rows) > 1 .and. maxval(chunks%count) <= 3*maxval(chunks%rows), 'nearly square')
+                  if (allocated(error)) return
+               end associate
+            end do
+            deallocate (status)
+         end do
+      end do
+   end subroutine test_tiles
+
+   !> Chained rows are whole, side by side where several are missing; every row of which any point is missing is in one chunk,
+   !> and the others are in none.
    subroutine test_rows(error)
       !> Why the test failed.
       type(error_type), allocatable, intent(out) :: error
@@ -130,46 +220,64 @@ contains
       type(random_stream) :: random
       type(chunk_type), allocatable :: chunks(:)
       integer, allocatable :: status(:, :)
-      integer :: i, c, speeds, rows, share
+      integer :: i, k, speeds, rows, share, ranks
 
       random = random_stream(37_i8)
-      do i = 1, 100
+      do i = 1, 300
          case%solver%start = merge(start_up, start_down, mod(i, 2) == 0)
          call random%pick(1, 40, speeds)
-         call random%pick(1, 12, rows)
+         call random%pick(1, 40, rows)
          call random%pick(0, 3, share)
+         call random%pick(1, 40, ranks)
          call draw(random, speeds, rows, share, status)
-         chunks = plan_grid(case, status, 4)
-         call check(error, size(chunks), count(any(status == status_missing, dim=1)), 'one chunk a row')
+         ! Some rows that are missing as a whole, next to each other.
+         if (mod(i, 3) == 0) status(:, :rows/2) = status_missing
+         chunks = plan_grid(case, status, ranks)
+         call check(error, all(chunks%first == 1 .and. chunks%count == speeds), 'whole rows')
          if (allocated(error)) return
-         do c = 1, size(chunks)
-            call check(error, chunks(c)%first == 1 .and. chunks(c)%count == speeds, 'whole rows')
-            if (allocated(error)) return
-            call check(error, any(status(:, chunks(c)%row) == status_missing), 'rows with missing points')
-            if (allocated(error)) return
-         end do
+         associate (times => covered(chunks, speeds, rows))
+            do k = 1, rows
+               call check(error, all(times(:, k) == merge(1, 0, any(status(:, k) == status_missing))), 'row '//to_text(k) &
+                          //' of '//to_text(rows))
+               if (allocated(error)) return
+            end do
+         end associate
+         if (size(chunks) == 0) cycle
+         call check(error, maxval(chunks%rows) <= max(1, rows/ranks), 'rows left for the other ranks')
+         if (allocated(error)) return
       end do
    end subroutine test_rows
 
-   !> Rows of rising stiffness, speeds of rising number.
+   !> Rows of rising stiffness, tile by tile: none is begun that is softer than all rows of the tiles under way. Speeds of rising
+   !> number within a row.
    subroutine test_order(error)
       !> Why the test failed.
       type(error_type), allocatable, intent(out) :: error
 
+      integer, parameter :: speeds = 200, rows = 45
       type(case_type) :: case
       type(random_stream) :: random
       type(chunk_type), allocatable :: chunks(:)
       integer, allocatable :: status(:, :)
-      integer :: c
+      integer :: c, k, share, latest(rows)
 
       random = random_stream(41_i8)
       case%solver%start = start_rest
-      call draw(random, 200, 15, 7, status)
-      chunks = plan_grid(case, status, 2)
-      do c = 2, size(chunks)
-         call check(error, chunks(c)%row > chunks(c - 1)%row .or. (chunks(c)%row == chunks(c - 1)%row &
-                                                                   .and. chunks(c)%first > chunks(c - 1)%first))
-         if (allocated(error)) return
+      do share = 1, 10
+         call draw(random, speeds, rows, share, status)
+         chunks = plan_grid(case, status, 2)
+         latest = 0
+         do c = 1, size(chunks)
+            associate (first => chunks(c)%row, last => chunks(c)%row + chunks(c)%rows - 1)
+               call check(error, last + tallest_tile > maxval(chunks(:c)%row), 'softest first')
+               if (allocated(error)) return
+               do k = first, last
+                  call check(error, chunks(c)%first > latest(k), 'speeds of row '//to_text(k))
+                  if (allocated(error)) return
+                  latest(k) = chunks(c)%first + chunks(c)%count - 1
+               end do
+            end associate
+         end do
       end do
    end subroutine test_order
 
@@ -199,7 +307,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       type(case_type) :: case
-      integer :: status(10, 3), none(0, 0)
+      integer :: status(10, 3), none(0, 0), no_speed(0, 3), no_row(10, 0)
       integer :: start
 
       status = status_settled
@@ -207,7 +315,13 @@ contains
          case%solver%start = start
          call check(error, size(plan_grid(case, status, 2)), 0, 'complete')
          if (allocated(error)) return
+         call check(error, size(plan_row(case, status(:, 1), 2)), 0, 'complete row')
+         if (allocated(error)) return
          call check(error, size(plan_grid(case, none, 2)), 0, 'empty')
+         if (allocated(error)) return
+         call check(error, size(plan_grid(case, no_speed, 2)), 0, 'no speeds')
+         if (allocated(error)) return
+         call check(error, size(plan_grid(case, no_row, 2)), 0, 'no rows')
          if (allocated(error)) return
       end do
    end subroutine test_nothing
@@ -225,7 +339,7 @@ contains
       status = status_missing
       do ranks = 1, 64
          associate (chunks => plan_grid(case, status, ranks))
-            call check(error, part*maxval(chunks%count) <= speeds*rows/ranks)
+            call check(error, part*maxval(chunks%rows*chunks%count) <= speeds*rows/ranks)
             if (allocated(error)) return
          end associate
       end do

@@ -57,10 +57,11 @@ contains
       !> The response.
       type(response), intent(out) :: answer
 
-      type(solver_type) :: solver
+      type(solver_type), allocatable :: solver
       type(no_attendant) :: nobody
 
       if (.not. allocated(position)) allocate (position(equations%n), velocity(equations%n), source=0.0_wp)
+      allocate (solver)
       call new_solver(options, solver)
       call respond_one(solver, equations, position, velocity, nobody, answer)
    end subroutine solve_point
