@@ -1,0 +1,196 @@
+!> Time the solution of single operating points on a flexible support.
+!>
+!> usage: time_points DECK REPEATS < POINTS
+!>
+!> POINTS has a line `speed support_stiffness` [rev/min, N/m] for every point. The whole list is solved REPEATS times with the
+!> deck's solver, each point from its start (`static` or `rest`). Prints one JSON line a point: `seconds` is the median of the
+!> time of eight copies of the point, which fill the lanes, over eight; `list_seconds` the median time of the whole list at
+!> once over the number of points.
+program time_points
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use, intrinsic :: iso_fortran_env, only: error_unit, input_unit, int64, output_unit
+   use spurflex_base_attendant, only: no_attendant
+   use spurflex_base_error, only: error_type
+   use spurflex_base_kinds, only: wp
+   use spurflex_integrate_options, only: start_rest
+   use spurflex_io_case, only: case_type
+   use spurflex_io_deck, only: read_deck
+   use spurflex_measure_points, only: new_solver, solver_type, respond
+   use spurflex_measure_response, only: response
+   use spurflex_model_equations, only: equations_type, new_equations, rest_deviation
+   use spurflex_model_parameters, only: operating_point, support_flexible
+   implicit none
+
+   !> Copies of a point that are solved side by side for its time.
+   integer, parameter :: company = 8
+
+   character(len=1024) :: deck, word
+   type(case_type) :: case
+   type(error_type), allocatable :: error
+   type(operating_point), allocatable :: points(:)
+   type(response), allocatable :: answers(:)
+   real(wp), allocatable :: seconds(:, :), list_seconds(:)
+   integer :: repeats, repeat, stat, i
+
+   if (command_argument_count() /= 2) call give_up('usage: time_points DECK REPEATS < POINTS')
+   call get_command_argument(1, deck)
+   call get_command_argument(2, word)
+   read (word, *, iostat=stat) repeats
+   if (stat /= 0 .or. repeats < 1) call give_up('REPEATS must be a positive integer')
+   call read_deck(trim(deck), case, error)
+   if (allocated(error)) call give_up(error%message)
+   call read_points(points)
+
+   allocate (answers(size(points)), seconds(repeats, size(points)), list_seconds(repeats))
+   do repeat = 1, repeats
+      call solve_list(case, points, answers, seconds(repeat, :), list_seconds(repeat))
+   end do
+   do i = 1, size(points)
+      call print_answer(points(i), answers(i), median(seconds(:, i)), median(list_seconds)/real(size(points), wp))
+   end do
+
+contains
+
+   !> Stop with a message.
+   subroutine give_up(message)
+      !> Message.
+      character(len=*), intent(in) :: message
+
+      write (error_unit, '(a)') message
+      stop 1
+   end subroutine give_up
+
+   !> Read the points on standard input.
+   subroutine read_points(list)
+      !> Points.
+      type(operating_point), allocatable, intent(out) :: list(:)
+
+      type(operating_point) :: point
+      real(wp) :: speed, stiffness
+
+      allocate (list(0))
+      point%support = support_flexible
+      do
+         read (input_unit, *, iostat=stat) speed, stiffness
+         if (stat /= 0) exit
+         point%speed = speed
+         point%support_stiffness = stiffness
+         list = [list, point]
+      end do
+   end subroutine read_points
+
+   !> Solve every point of a list once.
+   subroutine solve_list(problem, list, responses, times, total)
+      !> Case.
+      type(case_type), intent(in) :: problem
+      !> Points.
+      type(operating_point), intent(in) :: list(:)
+      !> What is found, shape (points).
+      type(response), intent(out) :: responses(:)
+      !> Time of every point, shape (points), and of all together [s].
+      real(wp), intent(out) :: times(:), total
+
+      type(solver_type), allocatable :: solver
+      type(no_attendant) :: nobody
+      type(equations_type) :: equations(size(list))
+      type(response) :: copies(company)
+      real(wp), allocatable :: positions(:, :), velocities(:, :)
+      real(wp) :: began
+      integer :: k
+
+      allocate (solver)
+      call new_solver(problem%solver, solver)
+      do k = 1, size(list)
+         began = clock()
+         equations(k) = new_equations(problem%gears, problem%box, problem%load, list(k))
+         call set_starts(problem, spread(equations(k), 1, company), positions, velocities)
+         call respond(solver, spread(equations(k), 1, company), positions, velocities, nobody, copies)
+         times(k) = (clock() - began)/real(company, wp)
+      end do
+      began = clock()
+      call new_solver(problem%solver, solver)
+      call set_starts(problem, equations, positions, velocities)
+      call respond(solver, equations, positions, velocities, nobody, responses)
+      total = clock() - began
+   end subroutine solve_list
+
+   !> Where points start.
+   subroutine set_starts(problem, equations, positions, velocities)
+      !> Case.
+      type(case_type), intent(in) :: problem
+      !> Equations of motion of each point, shape (points).
+      type(equations_type), intent(in) :: equations(:)
+      !> Deviation from the static equilibrium and its rate, shape (n, points).
+      real(wp), allocatable, intent(out) :: positions(:, :), velocities(:, :)
+
+      integer :: k
+
+      allocate (positions(equations(1)%n, size(equations)), velocities(equations(1)%n, size(equations)), source=0.0_wp)
+      if (problem%solver%start /= start_rest) return
+      do k = 1, size(equations)
+         positions(:, k) = rest_deviation(equations(k))
+      end do
+   end subroutine set_starts
+
+   !> Time since some moment [s].
+   function clock() result(now)
+      !> Time.
+      real(wp) :: now
+
+      integer(int64) :: count, rate
+
+      call system_clock(count, rate)
+      now = real(count, wp)/real(rate, wp)
+   end function clock
+
+   !> Median.
+   pure function median(values) result(middle)
+      !> Values, at least one.
+      real(wp), intent(in) :: values(:)
+      !> Their median.
+      real(wp) :: middle
+
+      real(wp) :: sorted(size(values)), value
+      integer :: k, place, n
+
+      n = size(values)
+      do k = 1, n
+         value = values(k)
+         place = count(values(:k - 1) <= value) + 1
+         sorted(place + 1:k) = sorted(place:k - 1)
+         sorted(place) = value
+      end do
+      middle = 0.5_wp*(sorted((n + 1)/2) + sorted(n/2 + 1))
+   end function median
+
+   !> Print what was found at a point.
+   subroutine print_answer(point, answer, point_seconds, share_seconds)
+      !> Point.
+      type(operating_point), intent(in) :: point
+      !> What was found.
+      type(response), intent(in) :: answer
+      !> Time of the point alone and its share of the time of the list [s].
+      real(wp), intent(in) :: point_seconds, share_seconds
+
+      write (output_unit, '(13a, 3(i0, a))') '{"speed": ', json(point%speed), ', "stiffness": ', json(point%support_stiffness), &
+         ', "seconds": ', json(point_seconds), ', "list_seconds": ', json(share_seconds), &
+         ', "amplitude": ', json(answer%y1_amplitude), ', "error_estimate": ', json(answer%error_estimate), &
+         ', "motion": ', answer%motion, ', "status": ', answer%status, ', "periods_integrated": ', answer%periods_integrated, '}'
+   end subroutine print_answer
+
+   !> A number in JSON; null if it is none.
+   pure function json(value) result(text)
+      !> Number.
+      real(wp), intent(in) :: value
+      !> Text.
+      character(len=:), allocatable :: text
+
+      character(len=24) :: buffer
+
+      text = 'null'
+      if (.not. ieee_is_finite(value)) return
+      write (buffer, '(es24.16e3)') value
+      text = trim(adjustl(buffer))
+   end function json
+
+end program time_points
