@@ -143,3 +143,9 @@ def test_published_features() -> None:
     assert published_map().crests_above == (1180, 1730)
     with pytest.raises(KeyError):
         published_curve("soft")
+
+
+def test_peak_close_behind_a_jump_is_a_peak() -> None:
+    amplitude = 1 + crest(SPEED, 1163, 60, 10)
+    amplitude[SPEED < 1145] *= 0.7
+    assert [round(peak.speed) for peak in find_peaks(SPEED, amplitude)] == [1163]

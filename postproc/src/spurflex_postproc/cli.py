@@ -31,8 +31,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for number, entry in FIGURES.items():
             print(f"{number:>3}  {entry.title}")
         return COMPLETE
-    if chosen.figure is None or chosen.result is None:
+    if chosen.figure is None or not chosen.result:
         parser.error("name a figure and a result file, or --list")
+    if len(chosen.result) > 1 and not FIGURES[chosen.figure].several:
+        parser.error(f"figure {chosen.figure} is drawn from one result file")
     options = Options(stiffness=chosen.stiffness, mesh_axis=chosen.mesh_axis)
     try:
         _draw(chosen.figure, chosen.result, chosen.output, options)
@@ -48,16 +50,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return COMPLETE
 
 
-def _draw(number: str, path: Path, folder: Path, options: Options) -> None:
+def _draw(number: str, paths: Sequence[Path], folder: Path, options: Options) -> None:
     """Read, draw, write and report."""
     entry = FIGURES[number]
-    result = open_result(path)
-    require(result, entry.needs)
+    results = [open_result(path) for path in paths]
     style.apply()
-    for support, name in (("flexible", "status"), ("rigid", "rigid_status")):
-        if name in entry.needs:
-            print(f"{path}, {support} support: {coverage(result, support)}")
-    for drawing in entry.draw(result, options):
+    for result, path in zip(results, paths, strict=True):
+        require(result, entry.needs)
+        for support, name in (("flexible", "status"), ("rigid", "rigid_status")):
+            if name in entry.needs:
+                print(f"{path}, {support} support: {coverage(result, support)}")
+    for drawing in entry.draw(results if entry.several else results[0], options):
         if drawing.report:
             print(drawing.report)
         for file in save(drawing.figure, folder, drawing.name):
@@ -69,8 +72,10 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="spurflex-figures", description="Draw a figure from a spurflex result file."
     )
-    parser.add_argument("figure", nargs="?", choices=list(FIGURES), help="number of the figure")
-    parser.add_argument("result", nargs="?", type=Path, help="result file (HDF5)")
+    parser.add_argument("figure", nargs="?", choices=list(FIGURES), help="name of the figure")
+    parser.add_argument(
+        "result", nargs="*", type=Path, help="result file (HDF5); several for figure 'starts'"
+    )
     parser.add_argument(
         "--output", type=Path, default=Path(), metavar="FOLDER", help="where to (default: here)"
     )

@@ -1,4 +1,4 @@
-"""Writes figure files: complete or not at all, and the same bytes every time."""
+"""Writes figures and texts: complete or not at all, and the same bytes every time."""
 
 import os
 from contextlib import suppress
@@ -42,3 +42,27 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
             with suppress(FileNotFoundError):
                 path.unlink()
     return list(final.values())
+
+
+def write_text(path: Path, text: str) -> Path:
+    """Write a text file, complete or not at all.
+
+    Args:
+        path: The file; its folder is made if absent.
+        text: Content.
+
+    Returns:
+        The file.
+
+    Raises:
+        OSError: If it cannot be written.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        partial.write_text(text, "utf-8")
+        partial.replace(path)
+    finally:
+        with suppress(FileNotFoundError):
+            partial.unlink()
+    return path

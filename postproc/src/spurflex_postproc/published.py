@@ -76,3 +76,72 @@ def published_map() -> PublishedMap:
         flat=(float(values["flat"][0]), float(values["flat"][1])),
         irregular_above=float(values["irregular_above"]),
     )
+
+
+@dataclass(frozen=True)
+class PublishedPoint:
+    """The motion at one speed, and the lines of its spectrum.
+
+    Attributes:
+        figure: Number of the figure.
+        speed: Rotating speed [rev/min].
+        motion: Class of motion: '1T', '2T', '3T' or 'chaotic'.
+        dominant: Strongest order, in multiples of the mesh frequency.
+        orders: The other orders that are named.
+    """
+
+    figure: str
+    speed: float
+    motion: str
+    dominant: float
+    orders: tuple[float, ...]
+
+
+def published_regimes(support: str) -> tuple[tuple[str, float, float], ...]:
+    """Return the published motions: class, first and last speed [rev/min], in order.
+
+    Raises:
+        KeyError: If `support` is neither 'rigid' nor 'flexible'.
+    """
+    regimes = _table()["figure_3"][support]["regimes"]
+    return tuple((str(name), float(first), float(last)) for name, first, last in regimes)
+
+
+def published_points() -> tuple[PublishedPoint, ...]:
+    """Return the five speeds of figures 4 to 8."""
+    points = []
+    for figure in ("4", "5", "6", "7", "8"):
+        values = _table()[f"figure_{figure}"]
+        points.append(
+            PublishedPoint(
+                figure=figure,
+                speed=float(values["speed"]),
+                motion=str(values["motion"]),
+                dominant=float(values["dominant"]),
+                orders=tuple(float(order) for order in values["orders"]),
+            )
+        )
+    return tuple(points)
+
+
+def published_areas() -> tuple[dict[str, str], str]:
+    """Return the signs of eta by the letter of the area, and the letter with the largest eta."""
+    values = _table()["figure_10"]
+    return dict(values["areas"]), str(values["largest"])
+
+
+def tolerance(feature: str) -> float:
+    """Return the largest deviation that counts as agreement, as a fraction.
+
+    Args:
+        feature: 'peak', 'first_jump', 'jump', 'boundary' or 'order'.
+
+    Raises:
+        KeyError: For any other feature.
+    """
+    return float(_table()["tolerance"][feature])
+
+
+def standing_explanations() -> dict[str, str]:
+    """Return explanations of disagreements by the key of the row."""
+    return {str(key): str(text) for key, text in _table().get("explanations", {}).items()}

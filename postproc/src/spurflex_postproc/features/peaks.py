@@ -20,7 +20,8 @@ class Peak:
     Attributes:
         speed: Position [rev/min], between grid points.
         height: Amplitude there, in the unit of the curve.
-        prominence: Height above the higher of the two valleys beside it.
+        prominence: Height above the higher of the two valleys beside it; a branch that breaks off
+            in a jump falls as deep as the jump.
     """
 
     speed: float
@@ -59,7 +60,7 @@ def find_peaks(
     peaks = []
     for segment in branches.segments:
         for first, last in _maxima(y[segment]):
-            prominence = _prominence(y[segment], first, last)
+            prominence = _prominence(y, segment, first, last)
             at, height = _vertex(x[segment], y[segment], first, last)
             if prominence >= smallest * abs(height):
                 peaks.append(Peak(at, height, prominence))
@@ -74,13 +75,21 @@ def _maxima(y: Reals) -> list[tuple[int, int]]:
     return [(int(starts[at]), int(starts[at + 1]) - 1) for at in inner]
 
 
-def _prominence(y: Reals, first: int, last: int) -> float:
+def _prominence(y: Reals, segment: NDArray[np.intp], first: int, last: int) -> float:
     """Return the height of a top above the higher of the valleys beside it."""
     valleys = []
-    for side in (y[first::-1], y[last:]):
-        higher = np.flatnonzero(side > y[first])
-        valleys.append(side[: higher[0] if higher.size else None].min())
-    return float(y[first] - max(valleys))
+    inside = y[segment]
+    for side, beyond in (
+        (inside[first::-1], y[: segment[0]][::-1]),
+        (inside[last:], y[segment[-1] + 1 :]),
+    ):
+        higher = np.flatnonzero(side > inside[first])
+        valley = float(side[: higher[0] if higher.size else None].min())
+        known = beyond[np.isfinite(beyond)]
+        if not higher.size and known.size:
+            valley = min(valley, float(known[0]))
+        valleys.append(valley)
+    return float(inside[first] - max(valleys))
 
 
 def _vertex(x: Reals, y: Reals, first: int, last: int) -> tuple[float, float]:

@@ -1,0 +1,1 @@
+"""Derives the parameters that the article does not print from the features that it does."""
