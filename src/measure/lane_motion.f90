@@ -74,6 +74,8 @@ contains
          call points%advance_recorded(moving)
          call observe(view, points%size/2, points%record, points%steps)
          do k = 1, points%seats
+            ! An empty seat is integrated with the others, always from zero, so that nothing can overflow.
+            if (seats(k)%item == 0) moving(k, :) = 0.0_wp
             if (seats(k)%item == 0) cycle
             associate (seat => seats(k), i => seats(k)%item)
                call take_orbit(view, k, points%steps, points%record%middles, equations(members(i))%frequency, &

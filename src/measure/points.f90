@@ -128,9 +128,8 @@ contains
       !> They can.
       logical :: they_can
 
-      they_can = options%steps_per_period == 0
-      if (options%integrator == integrator_newmark .and. options%steps_per_period > 0) &
-         they_can = is_average(options) .and. options%steps_per_period <= most_newmark_steps
+      they_can = options%steps_per_period == 0 .or. (options%integrator == integrator_newmark .and. is_average(options) &
+                                                     .and. options%steps_per_period <= most_newmark_steps)
    end function solve_in_lanes
 
    !> Newmark's method takes the average acceleration.

@@ -206,14 +206,14 @@ contains
             associate (seat => seats(k), orbit => orbits(seats(k)%item))
                call end_pass(points%weight(:, members(seat%item)), points%half_backlash, scale(seat%item), states(k, :), &
                              affine, rough, seat, orbit, found(seat%item))
-               if (seat%item > 0) then
-                  call begin_pass(orbit%state, seat, states(k, :), tangents(k, :, :))
-               else
-                  ! An empty seat goes on from where nothing can overflow.
-                  states(k, :) = 0.0_wp
-                  tangents(k, :, :) = 0.0_wp
-               end if
+               if (seat%item > 0) call begin_pass(orbit%state, seat, states(k, :), tangents(k, :, :))
             end associate
+         end do
+         do k = 1, points%seats
+            if (seats(k)%item > 0) cycle
+            ! An empty seat is integrated with the others, always from zero, so that nothing can overflow.
+            states(k, :) = 0.0_wp
+            tangents(k, :, :) = 0.0_wp
          end do
          call visitor%attend()
       end do

@@ -114,15 +114,17 @@ contains
             call points%advance(states)
          end if
          do k = 1, points%seats
-            if (seated(k) == 0) cycle
+            if (seated(k) == 0) then
+               ! An empty seat is integrated with the others, always from zero, so that nothing can overflow.
+               states(k, :) = 0.0_wp
+               tangents(k, 1, :) = 0.0_wp
+               cycle
+            end if
             associate (transient => transients(members(seated(k))))
                call see_section(points%weight(:, members(seated(k))), states(k, :), tangents(k, 1, :), transient)
                if (transient%sound .and. transient%periods < until(seated(k))) cycle
                transient%tangent = tangents(k, 1, :)
                seated(k) = 0
-               ! An empty seat goes on from where nothing can overflow.
-               states(k, :) = 0.0_wp
-               tangents(k, 1, :) = 0.0_wp
             end associate
          end do
          call visitor%attend()
