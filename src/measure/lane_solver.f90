@@ -20,7 +20,10 @@ module spurflex_measure_lane_solver
    implicit none
    private
 
-   public :: lane_solver, find_part, measure_orbits, measure_windows
+   public :: lane_solver, forget_parts, find_part, measure_orbits, measure_windows
+
+   !> Linear parts that are kept for tiles to come; a few kilobytes each.
+   integer, parameter :: most_parts = 256
 
    !> Points in lanes.
    type :: lane_solver
@@ -41,6 +44,14 @@ module spurflex_measure_lane_solver
    end type lane_solver
 
 contains
+
+   !> Forget the linear parts met so far if they are many. To be called between tiles.
+   pure subroutine forget_parts(solver)
+      !> Solver.
+      type(lane_solver), intent(inout) :: solver
+
+      if (solver%parts > most_parts) solver%parts = 0
+   end subroutine forget_parts
 
    !> Which of the linear parts met so far is that of a point; a new one is added to them.
    subroutine find_part(solver, equations, part)

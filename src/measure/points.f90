@@ -10,7 +10,7 @@ module spurflex_measure_points
    use spurflex_integrate_options, only: solver_options, integrator_collocation, integrator_newmark
    use spurflex_integrate_steps, only: first_lane_steps, most_lane_steps, most_newmark_steps
    use spurflex_measure_effort, only: effort_type, stage_search, stage_measure, stage_alone
-   use spurflex_measure_lane_solver, only: lane_solver, find_part, measure_orbits, measure_windows
+   use spurflex_measure_lane_solver, only: lane_solver, forget_parts, find_part, measure_orbits, measure_windows
    use spurflex_measure_point, only: point_solver, new_point_solver, respond_alone
    use spurflex_measure_response, only: response, empty_response
    use spurflex_model_equations, only: equations_type
@@ -92,6 +92,7 @@ contains
 
       done = .false.
       if (solve_in_lanes(solver%lanes%options)) then
+         call forget_parts(solver%lanes)
          do i = 1, size(equations)
             call find_part(solver%lanes, equations(i), part(i))
             steps(i) = huge(steps)
