@@ -18,6 +18,8 @@ module spurflex_integrate_ensemble
       real(wp) :: half_backlash = 0.0_wp
       !> What a component of a state counts for in a norm in metres, shape (size, points).
       real(wp), allocatable :: weight(:, :)
+      !> A component is one of the point's own, not room for modes that others have, shape (size, points).
+      logical, allocatable :: in_use(:, :)
       !> Extremes of the mesh deflection over the latest period, shape (seats) [m].
       real(wp), allocatable :: smallest(:), largest(:)
    contains
@@ -86,6 +88,7 @@ contains
       solo%size = map%size
       solo%half_backlash = map%half_backlash
       solo%weight = reshape(map%weight, [map%size, 1])
+      allocate (solo%in_use(map%size, 1), source=.true.)
       allocate (solo%smallest(1), solo%largest(1), source=0.0_wp)
    end subroutine new_solo
 

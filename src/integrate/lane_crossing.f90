@@ -2,7 +2,9 @@
 !>
 !> The step is not cut. The mesh force is continued on the branch on which the step begins, and what it then has too much or
 !> too little beyond a border, a known integral over a known part of the step, is added to N by its first three Legendre
-!> moments. Lanes without a crossing do the same operations and keep what they had, so that no lane knows its neighbours.
+!> moments, in two corrections. The derivative is that of the step solved to the end: near enough for Newton's method to gain
+!> several digits a step, and for multipliers as good as the step. Lanes without a crossing do the same operations and keep
+!> what they had, so that no lane knows its neighbours.
 module spurflex_integrate_lane_crossing
    use spurflex_base_kinds, only: wp
    use spurflex_integrate_lane_contact, only: solve

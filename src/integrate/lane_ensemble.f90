@@ -76,6 +76,7 @@ contains
          end if
          self%weight(:, i) = widen(modal(part(i))%weight, modes)
       end do
+      self%in_use = self%weight > 0.0_wp
       ! An empty lane follows the first point.
       self%rule%modes = modes
       do i = 1, lanes

@@ -101,7 +101,7 @@ contains
       integer, intent(in) :: extent(:)
       !> Responses in the order of the file, shape (points).
       type(response), intent(in) :: responses(:)
-      !> Changes by the flexible support [percent], shape (2, points); NaN where unknown.
+      !> Changes by the flexible support [percent] and their error, shape (3, points); NaN where unknown.
       real(wp), intent(in) :: eta(:, :)
       !> Set if they cannot be written.
       type(error_type), allocatable, intent(out) :: error

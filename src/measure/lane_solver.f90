@@ -29,10 +29,11 @@ module spurflex_measure_lane_solver
    type :: lane_solver
       !> Options.
       type(solver_options) :: options
-      !> The points, and those that judge them; room for what the lanes see.
+      !> The points, and those that judge them.
       type(lane_ensemble) :: points, judge
       !> Steps per mesh period with which collocation finds the motion; the judge takes more than twice as many.
       integer :: steps = 0
+      !> Room for what the lanes see.
       type(lane_view) :: view
       !> Linear parts met so far, with their modes and displacements.
       integer :: parts = 0
@@ -113,7 +114,7 @@ contains
       !> The response meets the tolerance, shape (n).
       logical, intent(inout) :: complete(:)
 
-      integer :: steps(size(equations)), next, i
+      integer :: steps(size(equations)), found_by(size(equations)), next, i
       integer, allocatable :: open(:), group(:)
       logical :: agreed(size(equations))
 
@@ -121,6 +122,9 @@ contains
       do i = 1, size(equations)
          steps(i) = measuring_steps(solver, equations(i))
       end do
+      ! Steps that found the orbits; free steps of Newmark's method did not.
+      found_by = steps
+      if (solver%by_newmark() .and. solver%options%steps_per_period == 0) found_by = 0
       do while (size(open) > 0)
          next = minval(steps(open))
          group = pack(open, steps(open) == next)
@@ -128,8 +132,8 @@ contains
          if (next /= solver%points%steps .or. (solver%by_newmark() .neqv. solver%points%by_newmark)) then
             solver%points%by_newmark = solver%by_newmark()
             call solver%points%load(equations, solver%modal, part, next)
-            call find_again(solver, group, visitor, motions, orbits, agreed)
          end if
+         if (any(found_by(group) /= next)) call find_again(solver, group, visitor, motions, orbits, agreed)
          call judge_orbits(solver, equations, part, pack(group, agreed(group)), visitor, motions, orbits, answers, agreed)
          do i = 1, size(group)
             associate (p => group(i), error => answers(group(i))%error_estimate)
@@ -138,7 +142,7 @@ contains
                call describe_motion(motions(p), answers(p))
                if (solver%options%steps_per_period > 0) then
                   complete(p) = .true.
-                  if (error > solver%options%tolerance) answers(p)%status = status_inaccurate
+                  if (.not. error <= solver%options%tolerance) answers(p)%status = status_inaccurate
                else
                   complete(p) = error <= aim*solver%options%tolerance
                   if (.not. complete(p)) steps(p) = better_lane_steps(next, error, solver%options)
@@ -324,7 +328,8 @@ contains
          call load_judge(solver, equations, part)
          call measure_group(pack(members, steps(members) == steps(members(i))))
       end do
-      complete(members) = .true.
+      ! What is not finite may have had too few steps.
+      complete(members) = answers(members)%error_estimate < huge(1.0_wp)
 
    contains
 

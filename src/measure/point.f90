@@ -55,13 +55,14 @@ contains
    end subroutine new_point_solver
 
    !> The response of one point. A point that fails is a status in the response, not an error.
-   subroutine respond_alone(solver, equations, position, velocity, visitor, motion, answer)
+   subroutine respond_alone(solver, equations, start_position, start_velocity, position, velocity, visitor, motion, answer)
       !> Solver.
       type(point_solver), intent(inout) :: solver
       !> Equations of motion of the point.
       type(equations_type), intent(in) :: equations
-      !> Deviation from the static equilibrium and its rate: at the start, or at a section of the motion if that is known, before;
-      !> at the last section after, shape (n).
+      !> Deviation from the static equilibrium and its rate at the start, shape (n).
+      real(wp), intent(in) :: start_position(:), start_velocity(:)
+      !> The same at a section of the motion if that is known, at the start if not, before; at the last section after.
       real(wp), allocatable, intent(inout) :: position(:), velocity(:)
       !> Let in now and then.
       class(attendant), intent(inout) :: visitor
@@ -71,14 +72,12 @@ contains
       type(response), intent(out) :: answer
 
       type(error_type), allocatable :: error
-      real(wp), allocatable :: start_position(:), start_velocity(:), state(:)
+      real(wp), allocatable :: state(:)
       integer :: steps
       logical :: is_free, known, found, agreed, accurate
 
       answer = empty_response()
       answer%status = status_diverged
-      start_position = position
-      start_velocity = velocity
       steps = solver%options%steps_per_period
       if (steps == 0) steps = first_steps(equations, solver%options)
       accurate = .false.
@@ -167,7 +166,7 @@ contains
       class(attendant), intent(inout) :: visitor
       !> The response, whose error estimate is filled in.
       type(response), intent(inout) :: answer
-      !> The judge finds the motion too, stable and with the same period.
+      !> The judge finds the motion too.
       logical, intent(out) :: agreed
 
       type(response) :: judged

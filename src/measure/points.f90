@@ -85,12 +85,15 @@ contains
       type(response), intent(out) :: answers(:)
 
       type(steady_motion) :: motions(size(equations))
+      real(wp), dimension(size(positions, 1), size(positions, 2)) :: start_positions, start_velocities
       real(wp), allocatable :: position(:), velocity(:)
       integer :: steps(size(equations)), part(size(equations)), i, k
       integer, allocatable :: group(:)
       logical :: done(size(equations))
 
       done = .false.
+      start_positions = positions
+      start_velocities = velocities
       if (solve_in_lanes(solver%lanes%options)) then
          call forget_parts(solver%lanes)
          do i = 1, size(equations)
@@ -114,7 +117,8 @@ contains
          call solver%effort%begin()
          position = positions(:, i)
          velocity = velocities(:, i)
-         call respond_alone(solver%alone, equations(i), position, velocity, visitor, motions(i), answers(i))
+         call respond_alone(solver%alone, equations(i), start_positions(:, i), start_velocities(:, i), position, velocity, &
+                            visitor, motions(i), answers(i))
          positions(:, i) = position
          velocities(:, i) = velocity
          call solver%effort%end(stage_alone)
@@ -122,7 +126,7 @@ contains
       end do
    end subroutine respond
 
-   !> Lanes can do what is asked for: collocation with free steps, or Newmark's method of average acceleration.
+   !> Lanes can find the motions: with free steps, or with given ones by Newmark's method of average acceleration.
    pure function solve_in_lanes(options) result(they_can)
       !> Options.
       type(solver_options), intent(in) :: options

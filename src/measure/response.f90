@@ -1,6 +1,6 @@
 !> The record of one point: what was found, and how good it is.
 module spurflex_measure_response
-   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
+   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan, ieee_is_finite
    use spurflex_base_kinds, only: wp
    use spurflex_model_equations, only: equations_type
    use spurflex_steady_outcome, only: status_missing, status_settled, status_not_settled, status_diverged, status_inaccurate, &
@@ -113,11 +113,14 @@ contains
       type(equations_type), intent(in) :: equations
       !> Both responses.
       type(response), intent(in) :: a, b
-      !> Relative difference; zero where they differ by round-off of the static displacements.
+      !> Relative difference; zero where they differ by round-off of the static displacements, huge where one is not finite.
       real(wp) :: difference
 
       real(wp) :: noise
 
+      difference = huge(1.0_wp)
+      if (.not. all(ieee_is_finite([a%y1_amplitude, a%y1_rms, a%bearing_deformation_max, b%y1_amplitude, b%y1_rms, &
+                                    b%bearing_deformation_max]))) return
       noise = roundoff*max(abs(equations%static_deflection), maxval(abs(equations%static_observation(2:))))
       difference = maxval(max(abs([a%y1_amplitude - b%y1_amplitude, a%bearing_deformation_max - b%bearing_deformation_max]) &
                               - noise, 0.0_wp)/max([b%y1_amplitude, b%bearing_deformation_max], tiny(1.0_wp)))

@@ -43,7 +43,8 @@ module spurflex_model_modal
       !> y1, d_x1, d_y1, d_x2, d_y2 are the real part of this times z, shape (5, modes).
       complex(wp), allocatable :: observation(:, :)
       !> What a component of a state, real parts of the modes and then imaginary parts, counts for in a norm in metres: the
-      !> largest displacement of its mode, the mesh deflection included, shape (2 modes).
+      !> largest displacement of its mode, the mesh deflection included; nothing for the imaginary part of a real mode,
+      !> shape (2 modes).
       real(wp), allocatable :: weight(:)
       !> Rate of the fastest mode that the mesh feels: of those that give way to it, the others follow at once [1/s].
       real(wp) :: fastest = 0.0_wp
@@ -120,6 +121,7 @@ contains
       allocate (modal%weight(2*modal%modes))
       do j = 1, modal%modes
          modal%weight([j, modal%modes + j]) = max(1.0_wp, maxval(abs(modal%observation(:, j))))
+         if (modal%is_real(j)) modal%weight(modal%modes + j) = 0.0_wp
       end do
       associate (give => abs(modal%influence/modal%rate))
          modal%fastest = maxval(abs(modal%rate), mask=give >= felt_share*sum(give))

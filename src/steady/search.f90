@@ -12,7 +12,7 @@ module spurflex_steady_search
    use spurflex_integrate_period_map, only: period_map
    use spurflex_steady_outcome, only: steady_motion, status_missing, status_settled, status_not_settled, status_diverged, &
       motion_unresolved, motion_quasi_periodic, motion_chaotic, motion_of_periods, longest_named
-   use spurflex_steady_sections, only: weighted_norm, longest_period
+   use spurflex_steady_sections, only: weighted_norm
    use spurflex_steady_shooting, only: periodic_orbit, contact_is_kept
    use spurflex_steady_stability, only: find_stable_orbits, largest_multiplier
    use spurflex_steady_transient, only: transient_type, begin_transient, watch_from_now, advance_transients, drifts
@@ -100,7 +100,7 @@ contains
       logical :: is_last
 
       do i = 1, size(motions)
-         call begin_transient(points%weight(:, i), starts(:, i), transients(i))
+         call begin_transient(points%weight(:, i), points%in_use(:, i), starts(:, i), transients(i))
       end do
       left = [(i, i=1, size(motions))]
       next_look = first_look
@@ -176,7 +176,7 @@ contains
          do i = 1, n
             motions(sound(i))%periods_integrated = motions(sound(i))%periods_integrated + near(i)%integrated
          end do
-         call confirm_approach(points, sound, near(:n), options, visitor, transients, found(:n))
+         call confirm_approach(points, sound, near(:n), visitor, transients, found(:n))
          do i = 1, n
             if (.not. found(i)) cycle
             call describe_orbit(near(i), options, motions(sound(i)))
@@ -205,15 +205,13 @@ contains
    end subroutine describe_orbit
 
    !> Keep the orbits that the transients are on their way to.
-   subroutine confirm_approach(points, members, orbits, options, visitor, transients, found)
+   subroutine confirm_approach(points, members, orbits, visitor, transients, found)
       !> The points.
       class(ensemble), intent(inout) :: points
       !> Which of them, shape (n).
       integer, intent(in) :: members(:)
       !> The orbits, shape (n).
       type(periodic_orbit), intent(in) :: orbits(:)
-      !> Most periods.
-      type(solver_options), intent(in) :: options
       !> Let in between the periods.
       class(attendant), intent(inout) :: visitor
       !> The transients, shape (points); they go on meanwhile.
@@ -256,7 +254,7 @@ contains
                                  visitor)
          do i = 1, size(open)
             associate (transient => transients(members(open(i))), orbit => orbits(open(i)))
-               found(open(i)) = transient%sound .and. transient%periods <= options%max_periods + confirmations*longest_period
+               found(open(i)) = transient%sound
                if (.not. found(open(i))) cycle
                away = transient%state - orbit%state
                found(open(i)) = follows(points%weight(:, members(open(i))), orbit, away, away - predicted(:, i))

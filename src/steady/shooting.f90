@@ -108,7 +108,7 @@ contains
    end subroutine advance_periods
 
    !> Find a periodic motion near a state.
-   subroutine find_orbit(map, start, periods, scale, visitor, orbit, found, only_affine)
+   subroutine find_orbit(map, start, periods, scale, visitor, orbit, found)
       !> Period map at an operating point.
       class(period_map), intent(inout), target :: map
       !> State near the motion, shape (size).
@@ -123,8 +123,6 @@ contains
       type(periodic_orbit), intent(out) :: orbit
       !> There is one.
       logical, intent(out) :: found
-      !> Give up at once where contact is lost.
-      logical, intent(in), optional :: only_affine
 
       type(solo_ensemble) :: solo
       type(periodic_orbit) :: orbits(1)
@@ -133,7 +131,7 @@ contains
       call new_solo(map, solo)
       orbits(1)%periods = periods
       orbits(1)%state = start
-      call find_orbits(solo, [1], [scale], visitor, orbits, is_found, only_affine)
+      call find_orbits(solo, [1], [scale], visitor, orbits, is_found)
       orbit = orbits(1)
       found = is_found(1)
    end subroutine find_orbit
@@ -180,7 +178,7 @@ contains
             seats(k) = newton_seat(item=next, pass=merge(pass_near, merge(pass_look, pass_linear, affine), near))
             orbits(next)%integrated = 0
             call points%seat(k, members(next))
-            call begin_pass(orbits(next)%state, seats(k), states(k, :), tangents(k, :, :))
+            call begin_pass(points%in_use(:, members(next)), orbits(next)%state, seats(k), states(k, :), tangents(k, :, :))
             next = next + 1
          end do
          if (all(seats%item == 0)) exit
@@ -206,7 +204,8 @@ contains
             associate (seat => seats(k), orbit => orbits(seats(k)%item))
                call end_pass(points%weight(:, members(seat%item)), points%half_backlash, scale(seat%item), states(k, :), &
                              affine, rough, seat, orbit, found(seat%item))
-               if (seat%item > 0) call begin_pass(orbit%state, seat, states(k, :), tangents(k, :, :))
+               if (seat%item > 0) call begin_pass(points%in_use(:, members(seat%item)), orbit%state, seat, states(k, :), &
+                                                  tangents(k, :, :))
             end associate
          end do
          do k = 1, points%seats
@@ -220,7 +219,9 @@ contains
    end subroutine find_orbits
 
    !> Begin to advance a state, and a unit tangent for each component, over the period of the motion.
-   pure subroutine begin_pass(start, seat, state, tangents)
+   pure subroutine begin_pass(in_use, start, seat, state, tangents)
+      !> A component is one of the point's own, shape (size).
+      logical, intent(in) :: in_use(:)
       !> Where from, shape (size).
       real(wp), intent(in) :: start(:)
       !> Seat.
@@ -239,7 +240,7 @@ contains
       if (seat%pass /= pass_linear) return
       tangents = 0.0_wp
       do i = 1, size(start)
-         tangents(i, i) = 1.0_wp
+         if (in_use(i)) tangents(i, i) = 1.0_wp
       end do
    end subroutine begin_pass
 

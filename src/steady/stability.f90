@@ -68,6 +68,7 @@ contains
          states(1, :) = orbits(i)%state
          do k = 1, orbits(i)%periods/2
             call points%advance(states)
+            call visitor%attend()
             orbits(i)%integrated = orbits(i)%integrated + 1
             if (mod(orbits(i)%periods, k) /= 0) cycle
             if (weighted_norm(points%weight(:, members(i)), states(1, :) - orbits(i)%state) > same_section*size_of_motion) cycle

@@ -39,16 +39,18 @@ module spurflex_steady_transient
 contains
 
    !> Begin a transient.
-   pure subroutine begin_transient(weight, start, transient)
+   pure subroutine begin_transient(weight, in_use, start, transient)
       !> Weights of the states, shape (size).
       real(wp), intent(in) :: weight(:)
+      !> A component is one of the point's own, shape (size).
+      logical, intent(in) :: in_use(:)
       !> State at the first section, shape (size).
       real(wp), intent(in) :: start(:)
       !> The transient.
       type(transient_type), intent(out) :: transient
 
       transient%state = start
-      allocate (transient%tangent(size(start)), source=1.0_wp)
+      transient%tangent = merge(1.0_wp, 0.0_wp, in_use)
       transient%tangent = transient%tangent/weighted_norm(weight, transient%tangent)
       call transient%ring%reset(weight)
       call transient%ring%add(start)
@@ -125,6 +127,7 @@ contains
                if (transient%sound .and. transient%periods < until(seated(k))) cycle
                transient%tangent = tangents(k, 1, :)
                seated(k) = 0
+               states(k, :) = 0.0_wp
             end associate
          end do
          call visitor%attend()

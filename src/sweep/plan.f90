@@ -20,7 +20,7 @@ module spurflex_sweep_plan
    integer, parameter :: largest_chunk = 128
 
    !> Chunks that each rank should get at least, where there are enough points.
-   integer, parameter :: chunks_per_rank = 24
+   integer, parameter :: chunks_per_rank = 64
 
    !> Points that a rank solves side by side: fewer in a chunk leave lanes empty.
    integer, parameter :: smallest_chunk = 8

@@ -94,65 +94,85 @@ contains
       !> Responses at the speeds of one row after the other, shape (count rows).
       type(response), intent(out) :: responses(:)
 
-      type(equations_type) :: equations(size(responses))
+      type(equations_type), allocatable :: equations(:)
+      real(wp), allocatable :: positions(:, :), velocities(:, :)
+      integer :: i, k
+
+      if (.not. is_chained(case)) then
+         call set_points(case, chunk, 1, chunk%count, equations, positions, velocities)
+         call respond(solver, equations, positions, velocities, visitor, responses)
+         return
+      end if
+      ! Rows side by side, each point from where its neighbour ended.
+      do k = 1, chunk%count
+         i = merge(chunk%count + 1 - k, k, case%solver%start == start_down)
+         call continue_rows(i, k == 1)
+      end do
+
+   contains
+
+      !> Solve the points of one speed.
+      subroutine continue_rows(i, begins)
+         !> Index of the speed in the chunk.
+         integer, intent(in) :: i
+         !> It is the first one: it continues no other.
+         logical, intent(in) :: begins
+
+         type(response) :: column(chunk%rows)
+         real(wp), allocatable :: start_positions(:, :), start_velocities(:, :)
+         integer :: row, next
+
+         call set_points(case, chunk, i, i, equations, start_positions, start_velocities)
+         if (begins) then
+            positions = start_positions
+            velocities = start_velocities
+         else
+            next = merge(1, -1, case%solver%start == start_down)
+            do row = 1, chunk%rows
+               if (responses((row - 1)*chunk%count + i + next)%status /= status_diverged) cycle
+               positions(:, row) = start_positions(:, row)
+               velocities(:, row) = start_velocities(:, row)
+            end do
+         end if
+         call respond(solver, equations, positions, velocities, visitor, column)
+         responses(i::chunk%count) = column
+      end subroutine continue_rows
+
+   end subroutine solve_chunk
+
+   !> The points of some speeds of a chunk, at the starts that continue no other.
+   subroutine set_points(case, chunk, first, last, equations, positions, velocities)
+      !> Case.
+      type(case_type), intent(in) :: case
+      !> The chunk.
+      type(chunk_type), intent(in) :: chunk
+      !> First and last speed, as indices in the chunk.
+      integer, intent(in) :: first, last
+      !> Equations of motion at the speeds of one row after the other, shape ((last - first + 1) rows).
+      type(equations_type), allocatable, intent(out) :: equations(:)
+      !> Deviation from the static equilibrium and its rate, shape (n, (last - first + 1) rows).
+      real(wp), allocatable, intent(out) :: positions(:, :), velocities(:, :)
+
       type(operating_point) :: point
-      real(wp), allocatable :: positions(:, :), velocities(:, :), speed(:), stiffness(:)
+      real(wp), allocatable :: speed(:), stiffness(:)
       integer :: i, row, p
 
       speed = speeds(case%sweep)
       stiffness = stiffnesses(case%sweep)
       point%support = merge(support_flexible, support_rigid, chunk%row > 0)
+      allocate (equations((last - first + 1)*chunk%rows))
       do row = 1, chunk%rows
          if (chunk%row > 0) point%support_stiffness = stiffness(chunk%row + row - 1)
-         do i = 1, chunk%count
+         do i = first, last
             point%speed = speed(chunk%first + i - 1)
-            equations((row - 1)*chunk%count + i) = new_equations(case%gears, case%box, case%load, point)
+            equations((row - 1)*(last - first + 1) + i - first + 1) = new_equations(case%gears, case%box, case%load, point)
          end do
       end do
-      allocate (positions(equations(1)%n, size(responses)), velocities(equations(1)%n, size(responses)))
-      do p = 1, size(responses)
+      allocate (positions(equations(1)%n, size(equations)), velocities(equations(1)%n, size(equations)))
+      do p = 1, size(equations)
          call set_start(case, equations(p), positions(:, p), velocities(:, p))
       end do
-      if (is_chained(case)) then
-         call solve_chain(chunk, case%solver%start == start_down, solver, equations, positions, velocities, visitor, responses)
-      else
-         call respond(solver, equations, positions, velocities, visitor, responses)
-      end if
-   end subroutine solve_chunk
-
-   !> Solve rows side by side, each point from where its neighbour ended.
-   subroutine solve_chain(chunk, is_down, solver, equations, positions, velocities, visitor, responses)
-      !> The chunk.
-      type(chunk_type), intent(in) :: chunk
-      !> From the highest speed down.
-      logical, intent(in) :: is_down
-      !> Solver.
-      type(solver_type), intent(inout) :: solver
-      !> Equations of motion of each point, shape (count rows).
-      type(equations_type), intent(in) :: equations(:)
-      !> Starts of those points that continue no other, shape (n, count rows); overwritten.
-      real(wp), intent(inout) :: positions(:, :), velocities(:, :)
-      !> Let in now and then.
-      type(sweep_attendant), intent(inout) :: visitor
-      !> Responses, shape (count rows).
-      type(response), intent(inout) :: responses(:)
-
-      real(wp), dimension(size(positions, 1), chunk%rows) :: position, velocity
-      type(response) :: column(chunk%rows)
-      integer :: here(chunk%rows), i, k, row
-
-      do k = 1, chunk%count
-         i = merge(chunk%count + 1 - k, k, is_down)
-         here = [((row - 1)*chunk%count + i, row=1, chunk%rows)]
-         do row = 1, chunk%rows
-            if (k > 1 .and. column(row)%status /= status_diverged) cycle
-            position(:, row) = positions(:, here(row))
-            velocity(:, row) = velocities(:, here(row))
-         end do
-         call respond(solver, equations(here), position, velocity, visitor, column)
-         responses(here) = column
-      end do
-   end subroutine solve_chain
+   end subroutine set_points
 
    !> Where a point starts that continues no other: at rest, or in static equilibrium.
    pure subroutine set_start(case, equations, position, velocity)

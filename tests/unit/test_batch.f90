@@ -844,7 +844,7 @@ contains
       if (allocated(error)) return
       members = [(1 + mod(7*i, 2*speeds), i=1, 2*speeds)]
       do i = 1, 2*speeds
-         call begin_transient(points%weight(:, i), 0.5_wp*starts(:, i), together(i))
+         call begin_transient(points%weight(:, i), points%in_use(:, i), 0.5_wp*starts(:, i), together(i))
       end do
       alone = together
       do part = 1, 2
@@ -899,7 +899,7 @@ contains
       end do
       call points%load(equations, modal, [(i, i=1, n)], steps)
       do i = 1, n
-         call begin_transient(points%weight(:, i), spread(0.1_wp, 1, points%size), together(i))
+         call begin_transient(points%weight(:, i), points%in_use(:, i), spread(0.1_wp, 1, points%size), together(i))
       end do
       alone = together
       do i = n, 1, -1
