@@ -22,8 +22,6 @@ ROOT = Path(__file__).resolve().parents[2]
 DECK = ROOT / "input" / "paper" / "figure9.nml"
 
 COMPLETE, FAILED_POINTS = 0, 4  # exit codes of the program with a complete result file
-# How a point can have been solved: beginnings of words in the log, and the names.
-PATHS = {"linear": "linear", "shooting": "shooting", "transient": "transient", "chao": "chaos"}
 DISTURBED = 0.05  # share of the processors that others may use while a run is timed
 BYTES_PER_KIB = 1024
 MEGABYTE = 1e6
@@ -172,37 +170,19 @@ def spread(values):
 
 
 def paths_in(log):
-    """Points and seconds by path as far as the log tells them, and the lines it tells them in.
-
-    Read tolerantly: whole numbers are points, of the path that follows if the line begins with a number,
-    else of the one before; a number with the unit s is seconds of the path before it.
-    """
+    """Points by path and seconds by stage, of all lines `... by path` of the log together, and the lines."""
     points, seconds, lines = {}, {}, []
-    names = "|".join(PATHS)
-    token = re.compile(
-        rf"\b(?P<path>{names})|\b(?P<seconds>\d+(?:\.\d*)?) ?s\b|(?<![\d.])(?P<count>\d+)\b(?!\.\d)"
-    )
     for line in log.splitlines():
-        if re.match(r"\s*(deck|start|steps|title):|.*=", line):
+        found = re.search(r"\b(points|time) by path\b[^:]*:(.*)", line)
+        if not found:
             continue
-        found = list(token.finditer(re.sub(r"(?<=\d),(?=\d{3}\b)", "", line)))
-        kinds = [t.lastgroup for t in found]
-        if "path" not in kinds or len(found) == kinds.count("path"):
-            continue
-        count_first = kinds[0] == "count"
-        path, count = None, None
-        for t in found:
-            if t.lastgroup == "path":
-                path = PATHS[t["path"]]
-                if count is not None:
-                    points[path], count = count, None
-            elif t.lastgroup == "seconds" and path:
-                seconds[path] = float(t["seconds"])
-            elif t.lastgroup == "count" and count_first:
-                count = int(t["count"])
-            elif t.lastgroup == "count" and path:
-                points.setdefault(path, int(t["count"]))
         lines.append(line.strip())
+        if found[1] == "points":
+            for count, name in re.findall(r"(\d+) (\w+)", re.sub(r"\([^)]*\)", "", found[2])):
+                points[name] = points.get(name, 0) + int(count)
+        else:
+            for name, spent in re.findall(r"(\w+) ([\d.]+) s\b", found[2]):
+                seconds[name] = seconds.get(name, 0.0) + float(spent)
     return {"points": points, "seconds": seconds, "lines": lines}
 
 

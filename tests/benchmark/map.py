@@ -49,7 +49,6 @@ def measure(program, options, tolerance):
         "memory_megabytes_by_rank": memory,
         "disturbed_runs": {n: harness.disturbed(runs[n]) for n in RANKS},
         "paths": harness.paths_in(two[-1].log),
-        "check": harness.paths_in(harness.measured([str(program.path), "--check", str(deck)], 1).log),
         "outcome": harness.outcome_of(result),
         "runs": [r.summary() for n in RANKS for r in runs[n]],
     }

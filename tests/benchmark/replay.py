@@ -25,7 +25,7 @@ SEED = 20180720
 EFFICIENCY_LIMIT = 0.90  # on 1024 ranks, 10^6 points
 
 # Constants that are tried out, and the numbers of ranks that they must suit.
-LARGEST = tuple(2**k for k in range(10))
+LARGEST = tuple(2**k for k in range(3, 8))
 PER_RANK = tuple(2**k for k in range(10))
 TRIED_RANKS = (2, 32, 256, 1024)
 
@@ -116,6 +116,7 @@ class Map:
                 {
                     "ranks": ranks,
                     "chunk_length": lengths,
+                    "tile": schedule.tile(lengths["flexible"], self.costs.flexible.shape[1:]),
                     "chunks": int(chunks.size),
                     "rigid_seconds": rigid,
                     "flexible_seconds": flexible,
@@ -124,6 +125,7 @@ class Map:
                     "efficiency_of_the_flexible_points": alone["flexible"] / (ranks * flexible),
                     "best_efficiency_of_any_schedule": min(1.0, one / (ranks * self.bound(ranks))),
                     "dearest_chunk_seconds": float(chunks.max()),
+                    "seconds_per_rank_if_shared_evenly": float(chunks.sum()) / ranks,
                 }
             )
         return {
@@ -136,11 +138,14 @@ class Map:
 
 
 def try_constants(maps, all_ranks, now):
-    """How near to the best possible time other constants come; the best first: where it is least, most."""
+    """How near to the best possible time other constants come; the best first: where it is least, most.
+
+    `largest_chunk` up to the one for which costs were measured.
+    """
     tried = []
     for largest in sorted({*LARGEST, now.largest_chunk}):
         for per_rank in sorted({*PER_RANK, now.chunks_per_rank}):
-            constants = Constants(largest, per_rank)
+            constants = Constants(largest, per_rank, now.smallest_chunk)
             each = {m.name: {n: m.of_bound(constants, n) for n in all_ranks} for m in maps}
             values = [value for by_ranks in each.values() for value in by_ranks.values()]
             tried.append(

@@ -4,6 +4,7 @@ Mirrors src/sweep/plan.f90 (how chunks are cut) and src/sweep/schedule.f90 (how 
 """
 
 import heapq
+import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,10 +22,12 @@ class Constants:
 
     largest_chunk: int
     chunks_per_rank: int
+    smallest_chunk: int = 8
 
     def length(self, missing, ranks):
-        """Points of a chunk."""
-        return max(1, min(self.largest_chunk, missing // (ranks * self.chunks_per_rank)))
+        """Points that a chunk is meant to have."""
+        wanted = min(self.largest_chunk, missing // (ranks * self.chunks_per_rank))
+        return max(1, min(self.smallest_chunk, missing // ranks), wanted)
 
 
 @dataclass(frozen=True)
@@ -48,19 +51,30 @@ def parameter(path, name):
 
 def constants_of_plan(path=PLAN):
     """The constants as they stand in the plan."""
-    return Constants(int(parameter(path, "largest_chunk")), int(parameter(path, "chunks_per_rank")))
+    return Constants(*(int(parameter(path, field)) for field in Constants.__dataclass_fields__))
 
 
-def cut(row_costs, length):
-    """Costs of the chunks, in the order in which they are handed out; `row_costs` is (row, speed).
+def tile(length, shape):
+    """Rows and speeds of a chunk that is meant to have so many points, on a grid (row, speed).
 
-    Mirrors cut_rows in src/sweep/plan.f90 for a grid of which every point is missing and no point
-    continues another: row by row, softest support first, `length` neighbouring speeds at a time; the
-    last chunk of a row is what is left of it. `length` is max(1, min(largest_chunk, missing/(ranks*
-    chunks_per_rank))), see Constants.length.
+    Mirrors cut_rows in src/sweep/plan.f90 for points that do not continue each other: as square as it can
+    be, wider than high where the grid has few rows, as the one row of the rigid support.
     """
-    firsts = np.arange(0, row_costs.shape[1], length)
-    return np.add.reduceat(row_costs, firsts, axis=1).reshape(-1)
+    rows, speeds = shape
+    width = max(1, min(math.floor(math.sqrt(length) + 0.5), speeds))
+    height = max(1, min(length // width, rows))
+    return height, max(1, min(length // height, speeds))
+
+
+def cut(costs, length):
+    """Costs of the chunks, in the order in which they are handed out; `costs` of the points is (row, speed).
+
+    Mirrors cut_rows for a grid of which every point is missing: tiles of a fixed size, row of tiles by row
+    of tiles, softest support first; at the ends of the grid what is left of them.
+    """
+    height, width = tile(length, costs.shape)
+    rows, speeds = (np.arange(0, n, step) for n, step in zip(costs.shape, (height, width), strict=True))
+    return np.add.reduceat(np.add.reduceat(costs, rows, axis=0), speeds, axis=1).reshape(-1)
 
 
 def replay(costs, ranks, machine):

@@ -4,10 +4,10 @@ import re
 
 import numpy as np
 import pytest
-from costs import Costs
+from costs import Costs, fits, least_missing, sets_of, sets_of_every_other, tiles_of
 from harness import paths_in
 from replay import refined
-from schedule import PLAN, Constants, Machine, constants_of_plan, cut, lower_bound, replay
+from schedule import PLAN, Constants, Machine, constants_of_plan, cut, lower_bound, replay, tile
 
 FREE = Machine(latency=0.0, service=0.0, attendance=0.0, write=0.0)
 SHORT = 1e-9  # a latency that only says who asks first
@@ -91,42 +91,111 @@ def test_a_replay_is_never_below_the_bound():
         assert replay(costs, ranks, NEAR) >= lower_bound(costs, ranks) * (1 - 1e-9)
 
 
-def test_chunks_do_not_cross_rows():
-    costs = np.arange(14.0).reshape(2, 7)
-    assert cut(costs, 3).tolist() == [3.0, 12.0, 6.0, 24.0, 33.0, 13.0]
-    assert cut(costs, 100).tolist() == [21.0, 70.0]
+def test_chunks_are_tiles():
+    costs = np.arange(35.0).reshape(5, 7)
+    # Tiles of 2 rows and 4 speeds; what is left at the ends of the grid is cut off.
+    assert tile(8, costs.shape) == (2, 4)
+    assert cut(costs, 8).tolist() == [
+        costs[:2, :4].sum(),
+        costs[:2, 4:].sum(),
+        costs[2:4, :4].sum(),
+        costs[2:4, 4:].sum(),
+        costs[4:, :4].sum(),
+        costs[4:, 4:].sum(),
+    ]
     assert cut(costs, 1).tolist() == costs.reshape(-1).tolist()
 
 
+def test_one_row_is_cut_along_the_speeds():
+    costs = np.arange(7.0).reshape(1, 7)
+    assert cut(costs, 3).tolist() == [3.0, 12.0, 6.0]
+    assert cut(costs, 100).tolist() == [21.0]
+
+
+@pytest.mark.parametrize(
+    ("length", "shape", "expected"),
+    [
+        (8, (91, 571), (2, 4)),
+        (16, (91, 571), (4, 4)),
+        (30, (91, 571), (6, 5)),
+        (64, (91, 571), (8, 8)),
+        (128, (91, 571), (11, 11)),
+        (128, (1, 571), (1, 128)),
+        (128, (3, 571), (3, 42)),
+        (128, (571, 3), (42, 3)),
+        (1, (91, 571), (1, 1)),
+        (100, (2, 2), (2, 2)),
+    ],
+)
+def test_shape_of_tiles(length, shape, expected):
+    assert tile(length, shape) == expected
+
+
 def test_length_of_chunks():
-    constants = Constants(largest_chunk=32, chunks_per_rank=16)
-    assert constants.length(51961, 2) == 32
-    assert constants.length(51961, 1024) == 3
+    constants = Constants(largest_chunk=128, chunks_per_rank=24, smallest_chunk=8)
+    assert constants.length(51961, 2) == 128
+    assert constants.length(51961, 256) == 8
+    assert constants.length(10**6, 1024) == 40
+    assert constants.length(2500, 1024) == 2
     assert constants.length(571, 1024) == 1
 
 
 def test_the_plan_still_has_the_rule_that_is_mirrored():
     text = re.sub(r"\s+", "", PLAN.read_text())
-    assert re.search(r"length=max\(1,min\(largest_chunk,[^!]*?/\(ranks\*chunks_per_rank\)\)\)", text), (
-        "the rule of src/sweep/plan.f90 has changed: change Constants.length and cut in schedule.py too"
-    )
+    for line in (
+        "length=max(1,min(smallest_chunk,missing/ranks),min(largest_chunk,missing/(ranks*chunks_per_rank)))",
+        "width=max(1,min(nint(sqrt(real(length))),size(status,1)))",
+        "height=max(1,min(length/width,size(status,2)))",
+        "width=max(1,min(length/height,size(status,1)))",
+        "dofirst=1,size(status,2),height",
+        "dospeed=1,size(status,1),width",
+    ):
+        assert line in text, (
+            f"no {line} in src/sweep/plan.f90: change Constants.length, tile and cut in schedule.py too"
+        )
     constants = constants_of_plan()
-    assert constants.largest_chunk >= 1
+    assert constants.largest_chunk >= constants.smallest_chunk >= 1
     assert constants.chunks_per_rank >= 1
 
 
-@pytest.mark.parametrize(
-    "log",
-    [
-        "points by path: 31000 linear, 200 shooting, 30 transient, 9 chaotic\ntime: linear 0.5 s, chaos 2 s",
-        "by path: linear 31,000 (0.50 s), shooting 200, transient 30, chaos 9 (2.0 s)",
-        "  linear: 31000 points, 0.5 s\n  shooting: 200 points\n  transient 30\n  chaos  9  2.0 s",
-    ],
-)
-def test_paths_in_the_log(log):
-    found = paths_in("deck: chaos.nml 3\nsteps: at most 4000 periods of transient\n" + log)
-    assert found["points"] == {"linear": 31000, "shooting": 200, "transient": 30, "chaos": 9}
-    assert found["seconds"] == {"linear": 0.5, "chaos": 2.0}
+@pytest.mark.parametrize("length", [8, 16, 32, 64, 128])
+@pytest.mark.parametrize("shape", [(91, 571), (19, 115), (1, 571)])
+def test_missing_points_that_make_tiles_of_a_size(length, shape):
+    now = constants_of_plan()
+    if not fits(length, shape):
+        assert least_missing(length) > np.prod(shape)
+        return
+    tiles = tiles_of(length, shape)
+    assert np.bincount(tiles).max() == np.prod(tile(length, shape))
+    assert np.bincount(tiles, np.arange(tiles.size)) == pytest.approx(
+        cut(np.arange(tiles.size, dtype=float).reshape(shape), length)
+    )
+    seen = np.zeros(tiles.size, bool)
+    for blank in sets_of(length, tiles.size, tiles, np.random.default_rng(1)):
+        assert now.length(int(blank.sum()), 1) == length
+        whole = np.bincount(tiles, blank) == np.bincount(tiles)
+        seen |= whole[tiles]
+    assert seen.all()
+
+
+def test_every_other_point():
+    odd, even = sets_of_every_other((3, 5))
+    assert (odd ^ even).all()
+    assert odd.reshape(3, 5)[0].tolist() == [False, True, False, True, False]
+    assert odd.reshape(3, 5)[1].tolist() == [True, False, True, False, True]
+
+
+def test_paths_in_the_log():
+    points = "points by path: {} linear (kept, one monodromy), {} shooting, {} transient (class), {} alone"
+    log = f"""deck: transient.nml
+start: from rest; at most 4000 mesh periods of transient a point
+{points.format(31000, 200, 30, 9)}
+time by path, all ranks: search 3.02 s, measurement 0.50 s, alone 1.25 s
+{points.format(571, 0, 0, 0)}
+time by path, all ranks: search 0.01 s, measurement 0.02 s, alone 0.00 s"""
+    found = paths_in(log)
+    assert found["points"] == {"linear": 31571, "shooting": 200, "transient": 30, "alone": 9}
+    assert found["seconds"] == pytest.approx({"search": 3.03, "measurement": 0.52, "alone": 1.25})
 
 
 def test_other_lines_of_the_log_are_no_paths():
@@ -136,7 +205,7 @@ def test_other_lines_of_the_log_are_no_paths():
 
 def test_costs_between_the_measured_lengths():
     tables = np.array([[[4.0, 8.0]], [[2.0, 2.0]]])  # (length, row, speed)
-    costs = Costs((1, 16), flexible=tables, rigid=tables)
+    costs = Costs({"flexible": (1, 16), "rigid": (1, 16)}, flexible=tables, rigid=tables)
     assert costs.at("flexible", 1).tolist() == [[4.0, 8.0]]
     assert costs.at("flexible", 4) == pytest.approx(np.array([[3.0, 5.0]]))
     assert costs.at("rigid", 1000).tolist() == [[2.0, 2.0]]
