@@ -97,7 +97,8 @@ make_venv() {
     "$1" -m venv "${@:2}" "$venv" >/dev/null 2>&1 || { rm -rf "$venv" && false; }
 }
 
-# build PRESET: configure and compile; leaves the program in the build folder of the preset.
+# build PRESET [TARGET]: configure and compile, everything without a target; leaves the program in
+# the build folder of the preset.
 build() {
   local options=()
   # Debian's commands are those of the default MPI library, HDF5 above is Open MPI's.
@@ -110,7 +111,7 @@ build() {
   say "building: $1"
   # Status lines go away, warnings and errors stay.
   cmake --preset "$1" --log-level=NOTICE "${options[@]}" >/dev/null
-  cmake --build --preset "$1"
+  cmake --build --preset "$1" ${2:+--target "$2"}
 }
 
 # mpirun of the library that the release build is linked with.

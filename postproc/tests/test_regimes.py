@@ -87,6 +87,12 @@ def test_border_without_one_of_its_regimes_is_the_end_of_the_other() -> None:
     assert [one.side for one in found] == ["both", "both", "lower", "upper"]
 
 
+def test_one_regime_for_two_published_ones_counts_where_its_border_is_whole() -> None:
+    found = match_borders(find_regimes(SPEED, flags((5440, 2))), PUBLISHED)
+    assert [one.computed for one in found] == [None, None, None, 5445.0]
+    assert [one.complete for one in found] == [False, False, False, True]
+
+
 def test_border_with_another_motion_between_is_the_nearer_end() -> None:
     motion = flags((4640, 20), (4900, 1), (5100, 3), (5400, 1), (5460, 2))
     found = match_borders(find_regimes(SPEED, motion), PUBLISHED)

@@ -1,8 +1,10 @@
 """The look of all figures: sizes, fonts, lines, colours."""
 
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+from matplotlib import font_manager
 
 MILLIMETRE = 1 / 25.4
 """One millimetre in inches, the unit of matplotlib's figure sizes."""
@@ -82,6 +84,22 @@ def apply() -> None:
     mpl.use("Agg")
     mpl.rcdefaults()
     mpl.rcParams.update(RC)
+    _own_fonts_first()
+
+
+def _own_fonts_first() -> None:
+    """Prefer the fonts that come with matplotlib.
+
+    The list of fonts that matplotlib keeps in the user's cache can lack them, and a system font
+    of the same name draws other bytes.
+    """
+    manager = font_manager.fontManager
+    folder = Path(mpl.get_data_path()) / "fonts" / "ttf"
+    listed = [entry for entry in manager.ttflist if Path(entry.fname).parent != folder]
+    manager.ttflist.clear()
+    for file in sorted(folder.glob("*.ttf")):
+        manager.addfont(file)
+    manager.ttflist.extend(listed)
 
 
 def size(width: float, height: float) -> tuple[float, float]:

@@ -69,7 +69,7 @@ def comparison_table(title: str, rows: Sequence[tuple[str, Comparison]]) -> str:
     for name, comparison in rows:
         for here, there in comparison.pairs:
             found = "none" if there is None else f"{there:.0f}"
-            off = "-" if there is None else f"{100 * (there / here - 1):+.1f} %"
+            off = "-" if there is None else f"{100 * (there / here - 1):+z.1f} %"
             lines.append(f"  {name:<26}{here:>10.0f}{found:>10}{off:>11}")
         lines += [f"  {name:<26}{'-':>10}{there:>10.0f}{'-':>11}" for there in comparison.others]
     return "\n".join(lines)

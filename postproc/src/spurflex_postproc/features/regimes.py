@@ -32,6 +32,10 @@ class Regime:
     flags: tuple[int, ...]
 
 
+_Choice = tuple[int, int, float, dict[int, int]]
+"""Pairs, borders with both regimes, negative deviation, computed by published regime."""
+
+
 @dataclass(frozen=True)
 class Border:
     """A published border between two regimes and the computed one.
@@ -143,7 +147,8 @@ def match_borders(
     """Find the borders of a published sequence of regimes among the computed ones.
 
     The longest part of the published sequence that the computed one holds in the same order is
-    taken, and of equally long ones the one with the borders that deviate least. Where both
+    taken; of equally long ones that with most borders of which both regimes were found, then
+    that whose regimes deviate least. Where both
     regimes of a border were found, it is where they touch; if something else lies between them,
     it is the end of either that is nearer to the published speed. Where one was found, it is the
     end of that one.
@@ -177,20 +182,21 @@ def match_borders(
 
 
 def _align(regimes: list[Regime], wanted: Sequence[tuple[str, float, float]]) -> dict[int, int]:
-    """Pair published with computed regimes in order: as many as possible, then as near."""
-    table: dict[tuple[int, int], tuple[int, float, dict[int, int]]] = {}
+    """Pair published with computed regimes in order: as many as possible, connected, near."""
+    table: dict[tuple[int, int, bool], _Choice] = {}
 
-    def best(i: int, j: int) -> tuple[int, float, dict[int, int]]:
+    def best(i: int, j: int, joined: bool) -> _Choice:
+        # joined: whether the published regime before i is in a pair
         if i == len(wanted) or j == len(regimes):
-            return 0, 0.0, {}
-        if (i, j) not in table:
-            options = [best(i + 1, j), best(i, j + 1)]
+            return 0, 0, 0.0, {}
+        if (i, j, joined) not in table:
+            options = [best(i + 1, j, False), best(i, j + 1, joined)]
             name, first, last = wanted[i]
             if regimes[j].motion == name:
-                count, near, rest = best(i + 1, j + 1)
+                count, borders, near, rest = best(i + 1, j + 1, True)
                 off = abs(regimes[j].first - first) + abs(regimes[j].last - last)
-                options.append((count + 1, near - off, {i: j, **rest}))
-            table[i, j] = max(options, key=lambda option: option[:2])
-        return table[i, j]
+                options.append((count + 1, borders + joined, near - off, {i: j, **rest}))
+            table[i, j, joined] = max(options, key=lambda option: option[:3])
+        return table[i, j, joined]
 
-    return best(0, 0)[2]
+    return best(0, 0, False)[3]

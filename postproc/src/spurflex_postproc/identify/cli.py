@@ -67,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         print(f"spurflex-identify: cannot write: {error}", file=sys.stderr)
         return FAILED
-    print(text)
+    print(f"least misfit: '{best.hypothesis.key}', {best.hypothesis.statement}")
     for path in written:
         print(f"wrote {path}")
     return COMPLETE

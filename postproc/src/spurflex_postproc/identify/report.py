@@ -153,7 +153,7 @@ def _features(fits: Sequence[Fit]) -> str:
             if here.deviation is None:
                 row.append("none")
                 continue
-            text = f"{here.computed:.0f} ({100 * here.deviation:+.1f} %)"
+            text = f"{here.computed:.0f} ({100 * here.deviation:+z.1f} %)"
             row.append(f"**{text}**" if here.agrees else text + (" *" if here.partial else ""))
         rows.append(row)
     keys = [fit.hypothesis.key for fit in fits]
@@ -165,7 +165,7 @@ def _determined(best: Fit, found: Determined) -> str:
     """Say what the features determine."""
     names = [PARAMETER_TEXT[name] for name in found.parameters]
     effect = [
-        [feature, *(f"{value:+.2f}" for value in row)]
+        [feature, *(f"{value:+z.2f}" for value in row)]
         for feature, row in zip(found.features, found.jacobian, strict=True)
     ]
     rows = []
@@ -194,5 +194,5 @@ def _determined(best: Fit, found: Determined) -> str:
 def _combination(names: Sequence[str], direction: np.ndarray[Any, Any]) -> str:
     """Write a direction as its largest parts."""
     order = np.argsort(-np.abs(direction))
-    parts = [f"{direction[at]:+.2f} {names[at]}" for at in order if abs(direction[at]) > 0.2]
+    parts = [f"{direction[at]:+z.2f} {names[at]}" for at in order if abs(direction[at]) > 0.2]
     return " ".join(parts)

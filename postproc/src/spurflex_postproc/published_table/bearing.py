@@ -135,7 +135,7 @@ def _areas(result: xr.Dataset) -> list[Row]:
                 "10c",
                 f"area {letter}: eta {words}",
                 sign,
-                None if area is None else f"{area.mean:+.1f} % on average, {area.extreme:+.0f} %",
+                None if area is None else f"{area.mean:+z.1f} % on average, {area.extreme:+z.0f} %",
                 area is not None,
                 "no area with this sign in its place"
                 if area is None
@@ -151,7 +151,7 @@ def _areas(result: xr.Dataset) -> list[Row]:
             largest,
             best,
             best == largest,
-            f"{found[best].extreme:+.0f} %" if best in found else "",
+            f"{found[best].extreme:+z.0f} %" if best in found else "",
         )
     )
     return [*rows, general(map_)]
@@ -168,7 +168,7 @@ def general(map_: StiffnessMap) -> Row:
         "yes",
         f"above zero at {100 * above:.0f} % of the points, below at {100 * below:.0f} %",
         above > 0.5 and float(values.mean()) > 0,
-        f"mean {values.mean():+.1f} %, median {np.median(values):+.2f} %",
+        f"mean {values.mean():+z.1f} %, median {np.median(values):+z.2f} %",
     )
 
 

@@ -19,7 +19,7 @@ from spurflex_postproc.published_table.maps import map_rows
 from spurflex_postproc.published_table.regimes import point_rows, regime_rows
 from spurflex_postproc.published_table.row import Row
 from spurflex_postproc.published_table.sources import REFERENCE, Sources, load
-from spurflex_postproc.published_table.write import as_json, counts, markdown
+from spurflex_postproc.published_table.write import as_json, counts, markdown, summary
 
 COMPLETE, FAILED, UNUSABLE = 0, 1, 2
 
@@ -28,7 +28,7 @@ Setting = tuple[str, str, list[Row]]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write `published.md` and `published.json` from the result files of a folder; print them.
+    """Write `published.md` and `published.json` from the result files of a folder; count.
 
     Args:
         arguments: Command line without the program's name; `sys.argv` if absent.
@@ -54,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         print(f"spurflex-published: cannot write: {error}", file=sys.stderr)
         return FAILED
-    print(text)
+    print(summary(rows, conclusions))
     for path in written:
         print(f"wrote {path}")
     found = counts(rows)

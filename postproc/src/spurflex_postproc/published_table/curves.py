@@ -113,7 +113,7 @@ def _statements(result: xr.Dataset) -> list[Row]:
             "2",
             "flexible support: the other two peaks lie slightly higher than the rigid ones",
             "yes",
-            ", ".join(f"{100 * shift:+.1f} %" for shift in shifts) or "no pair of peaks",
+            ", ".join(f"{100 * shift:+z.1f} %" for shift in shifts) or "no pair of peaks",
             len(shifts) == len(others) and all(0 < shift < 0.2 for shift in shifts),
         ),
     ]

@@ -76,4 +76,4 @@ def shown(row: Row) -> str:
         return "nothing"
     if row.deviation is None:
         return str(row.computed)
-    return f"{row.computed:.0f} ({100 * row.deviation:+.1f} %)"
+    return f"{row.computed:.0f} ({100 * row.deviation:+z.1f} %)"

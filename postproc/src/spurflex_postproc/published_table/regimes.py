@@ -54,9 +54,10 @@ def regime_rows(result: xr.Dataset) -> list[Row]:
                 [regime.motion for regime in found.regimes] == wanted,
             )
         )
+        motions = {regime.motion for regime in found.regimes}
         for border in match_borders(found.regimes, told):
             lacking = [
-                name
+                f"second {name}" if name in motions else name
                 for name, there in zip((border.before, border.after), border.found, strict=True)
                 if not there
             ]

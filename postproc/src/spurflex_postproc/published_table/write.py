@@ -48,7 +48,7 @@ def markdown(
     Returns:
         Markdown text.
     """
-    parts = [PREAMBLE.format(start=start), _summary(rows, conclusions), "## Figures\n"]
+    parts = [PREAMBLE.format(start=start), summary(rows, conclusions), "## Figures\n"]
     parts.append(table(_HEAD, [_cells(row) for row in rows]))
     parts.append("## Conclusions as claims\n")
     parts.append(
@@ -135,11 +135,19 @@ def _settings(settings: Sequence[tuple[str, str, Sequence[Row]]]) -> str:
 
 def _off(row: Row) -> str:
     """Write a deviation in parentheses."""
-    return "" if row.deviation is None else f" ({100 * row.deviation:+.1f} %)"
+    return "" if row.deviation is None else f" ({100 * row.deviation:+z.1f} %)"
 
 
-def _summary(rows: Sequence[Row], conclusions: Sequence[Row]) -> str:
-    """Count the verdicts by figure."""
+def summary(rows: Sequence[Row], conclusions: Sequence[Row]) -> str:
+    """Count the verdicts by figure.
+
+    Args:
+        rows: Rows on figures 2 to 10.
+        conclusions: Rows on the conclusions.
+
+    Returns:
+        A Markdown table.
+    """
     lines = []
     for figure in dict.fromkeys(row.figure for row in rows):
         found = counts([row for row in rows if row.figure == figure])
