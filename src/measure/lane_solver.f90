@@ -292,7 +292,8 @@ contains
       integer :: i
 
       do i = 1, size(orbits)
-         scale(i) = max(weighted_norm(points%weight(:, members(i)), orbits(i)%state), points%half_backlash)
+         scale(i) = max(weighted_norm(points%weight(:, members(i)), orbits(i)%state), points%half_backlash, &
+                        tiny(1.0_wp))
       end do
    end function sizes
 

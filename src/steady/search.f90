@@ -163,7 +163,7 @@ contains
          p = sound(i)
          near(i)%state = transients(p)%state
          call transients(p)%ring%nearest(near(i)%periods, distance)
-         scale(i) = max(transients(p)%ring%scale(), abs(points%half_backlash))
+         scale(i) = max(transients(p)%ring%scale(), points%half_backlash, tiny(1.0_wp))
          promising(i) = near(i)%periods <= longest_named .or. distance <= long_recurrence*scale(i)
       end do
       near(:count(promising(:size(sound)))) = pack(near(:size(sound)), promising(:size(sound)))

@@ -16,7 +16,7 @@ module spurflex_sweep_driver
    use spurflex_measure_effort, only: effort_type
    use spurflex_measure_response, only: response, status_missing, status_diverged
    use spurflex_sweep_attendance, only: outcome_text
-   use spurflex_sweep_plan, only: chunk_type, plan_row, plan_grid, describe_plan
+   use spurflex_sweep_plan, only: chunk_type, plan_row, plan_grid, is_chained, describe_plan
    use spurflex_sweep_schedule, only: outcomes
    use spurflex_sweep_worker, only: work_on_chunks, no_twin
    implicit none
@@ -96,8 +96,8 @@ contains
          if (allocated(error)) return
       end if
       if (left == 0 .and. sum(total) == 0) call log%say('nothing to do: every point of '//case%output%file//' is there')
-      total(status_diverged) = total(status_diverged) + count(rigid_status == status_diverged) &
-                               + count(status == status_diverged)
+      total(status_diverged) = total(status_diverged) + diverged_before(case, reshape(rigid_status, [size(rigid_status), 1])) &
+                               + diverged_before(case, status)
       if (total(status_diverged) > 0) code = exit_failed_points
       if (left > 0) code = exit_stopped
       call close_results(results, error)
@@ -162,6 +162,24 @@ contains
          call create_results(results, case, comm, provenance, fresh, error)
       end if
    end subroutine open_file
+
+   !> Points of the file that have diverged and are not solved again: a chained row with a missing point is, as a whole.
+   pure function diverged_before(case, status) result(points)
+      !> Case.
+      type(case_type), intent(in) :: case
+      !> Status of each point as the run began, shape (speed, row).
+      integer, intent(in) :: status(:, :)
+      !> Number of points.
+      integer :: points
+
+      integer :: row
+
+      points = 0
+      do row = 1, size(status, 2)
+         if (is_chained(case) .and. any(status(:, row) == status_missing)) cycle
+         points = points + count(status(:, row) == status_diverged)
+      end do
+   end function diverged_before
 
    !> Read which points are missing, and the rigid twins that are there.
    subroutine find_missing(results, case, rigid_status, status, rigid_deformation, error)
