@@ -261,7 +261,7 @@ contains
       !> Sum of the moduli of its modes [m].
       real(wp) :: bound
 
-      bound = sum_of_moduli(self%modal, difference)
+      bound = sum_of_moduli(difference(:self%size))
    end function bound_of_modes
 
 end module spurflex_integrate_collocation

@@ -7,7 +7,7 @@ module spurflex_integrate_lane_ensemble
       point_rule, new_point_rule, new_mesh_cycle, load_rule
    use spurflex_integrate_lane_step, only: advance_lanes, carry_lane_tangents
    use spurflex_model_equations, only: equations_type
-   use spurflex_model_modal, only: modal_system
+   use spurflex_model_modal, only: modal_system, sum_of_moduli
    implicit none
    private
 
@@ -35,7 +35,7 @@ module spurflex_integrate_lane_ensemble
       procedure :: seat => seat_in_lane
       procedure :: advance => advance_seats
       procedure :: advance_recorded
-      procedure :: deflection_bound => sum_of_moduli
+      procedure :: deflection_bound => bound_of_modes
    end type lane_ensemble
 
 contains
@@ -146,7 +146,7 @@ contains
    end subroutine advance_recorded
 
    !> Bound of what a difference of states does to the mesh deflection.
-   pure function sum_of_moduli(self, difference) result(bound)
+   pure function bound_of_modes(self, difference) result(bound)
       !> Ensemble.
       class(lane_ensemble), intent(in) :: self
       !> Difference of two states, shape (size).
@@ -154,11 +154,8 @@ contains
       !> Sum of the moduli of its modes [m].
       real(wp) :: bound
 
-      integer :: m
-
-      m = self%size/2
-      bound = sum(sqrt(difference(:m)**2 + difference(m + 1:)**2))
-   end function sum_of_moduli
+      bound = sum_of_moduli(difference(:self%size))
+   end function bound_of_modes
 
    !> A state with room for more modes.
    pure function widen(state, modes) result(wide)

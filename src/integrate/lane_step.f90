@@ -77,7 +77,7 @@ contains
          if (present(gain)) call set_gain(r, slope, added_slope, crosses, gain%n(:, :, :, s))
          if (present(record)) then
             call keep(r, pitch, 2*s - 2, x(:, 1), re, im, record)
-            if (record%middles) call keep_middle(r, pitch, 2*s - 1, x(:, 2), re, im, n, record)
+            if (record%middles) call keep_middle(rule, pitch, 2*s - 1, x(:, 2), re, im, n, record)
          end if
          do j = 1, r%modes
             do l = 1, lanes
@@ -247,7 +247,7 @@ contains
       tangent_im = im(:, :r%modes)
    end subroutine carry_one
 
-   !> Copy the coefficients in use: copies on the stack are aligned to the vectors.
+   !> Copy the coefficients in use, but for those that only a record needs: copies on the stack are aligned to the vectors.
    pure subroutine copy_rule(rule, copy)
       !> Coefficients.
       type(lane_rule), intent(in) :: rule
@@ -264,8 +264,6 @@ contains
       copy%full_im(:, :m) = rule%full_im(:, :m)
       copy%taken_re(:, :m, :) = rule%taken_re(:, :m, :)
       copy%taken_im(:, :m, :) = rule%taken_im(:, :m, :)
-      copy%first_re(:, :m, :) = rule%first_re(:, :m, :)
-      copy%first_im(:, :m, :) = rule%first_im(:, :m, :)
       copy%middle = rule%middle
       copy%end = rule%end
       copy%static = rule%static

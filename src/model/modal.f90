@@ -195,15 +195,16 @@ contains
 
    !> Bound of what a difference of states does to the mesh deflection at any later time, while contact is kept and the mesh
    !> stiffness is the mean one.
-   pure function sum_of_moduli(modal, difference) result(bound)
-      !> Modes.
-      type(modal_system), intent(in) :: modal
-      !> Difference of two states, shape (2 modes).
+   pure function sum_of_moduli(difference) result(bound)
+      !> Difference of two states: real parts of the modes, then imaginary parts.
       real(wp), intent(in) :: difference(:)
       !> Sum of the moduli of its modes [m].
       real(wp) :: bound
 
-      bound = sum(sqrt(difference(:modal%modes)**2 + difference(modal%modes + 1:)**2))
+      integer :: m
+
+      m = size(difference)/2
+      bound = sum(sqrt(difference(:m)**2 + difference(m + 1:)**2))
    end function sum_of_moduli
 
 end module spurflex_model_modal
