@@ -1,6 +1,6 @@
 !> An ensemble in the lanes of the processor's vectors.
 module spurflex_integrate_lane_ensemble
-   use spurflex_base_kinds, only: wp
+   use spurflex_base_kinds, only: wp, i8
    use spurflex_integrate_ensemble, only: ensemble
    use spurflex_integrate_lane_newmark, only: new_newmark_rule, advance_newmark, carry_newmark
    use spurflex_integrate_lane_rule, only: lanes, most_modes, points, lane_rule, mesh_cycle, lane_gain, lane_record, &
@@ -11,15 +11,19 @@ module spurflex_integrate_lane_ensemble
    implicit none
    private
 
-   public :: lane_ensemble, widen, narrow
+   public :: lane_ensemble, widen, narrow, kinds_of_steps, steps_of_motions, steps_of_tangents, steps_recorded
+
+   !> Kinds of steps that are counted: of motions, of tangents that go with them, of motions that are recorded.
+   integer, parameter :: kinds_of_steps = 3
+   integer, parameter :: steps_of_motions = 1, steps_of_tangents = 2, steps_recorded = 3
 
    !> Points in lanes. A state holds the real parts of the modes, then the imaginary parts; a point with fewer modes than the
    !> others has zeros behind its own.
    type, extends(ensemble) :: lane_ensemble
+      !> Steps done so far, in all lanes at once, by kind.
+      integer(i8) :: steps_done(kinds_of_steps) = 0
       !> By Newmark's method of average acceleration, not by collocation.
       logical :: by_newmark = .false.
-      !> The middles of the steps are recorded too, by collocation.
-      logical :: with_middles = .true.
       !> Steps per mesh period.
       integer :: steps = 0
       !> The latest period of each seat, if it was recorded.
@@ -63,7 +67,6 @@ contains
       if (.not. allocated(self%rule)) allocate (self%rule)
       call reserve(self, steps)
       self%steps = steps
-      self%record%middles = self%with_middles .and. .not. self%by_newmark
       call new_mesh_cycle(equations(1)%mesh, steps, self%pitch)
       if (allocated(self%rules)) deallocate (self%rules)
       if (allocated(self%weight)) deallocate (self%weight)
@@ -95,8 +98,8 @@ contains
          if (size(self%gain%n, 4) >= steps) return
          deallocate (self%gain%n, self%record%re, self%record%im, self%record%force)
       end if
-      allocate (self%gain%n(lanes, points, points, steps), self%record%re(lanes, most_modes, 0:2*steps), &
-                self%record%im(lanes, most_modes, 0:2*steps), self%record%force(lanes, 0:2*steps), source=0.0_wp)
+      allocate (self%gain%n(lanes, points, points, steps), self%record%re(lanes, most_modes, 0:steps), &
+                self%record%im(lanes, most_modes, 0:steps), self%record%force(lanes, 0:steps), source=0.0_wp)
    end subroutine reserve
 
    !> Put a point into a lane.
@@ -118,6 +121,10 @@ contains
       !> Tangents that see the same contact, shape (seats, tangents, size).
       real(wp), intent(inout), optional, contiguous :: tangents(:, :, :)
 
+      if (present(tangents)) then
+         self%steps_done(steps_of_tangents) = self%steps_done(steps_of_tangents) + int(self%steps, i8)*size(tangents, 2)
+      end if
+      self%steps_done(steps_of_motions) = self%steps_done(steps_of_motions) + self%steps
       if (self%by_newmark .and. present(tangents)) then
          call advance_newmark(self%rule, self%pitch, states, self%smallest, self%largest, self%gain)
          call carry_newmark(self%rule, self%steps, self%gain, size(tangents, 2), tangents)
@@ -138,6 +145,7 @@ contains
       !> States at the section, shape (seats, size).
       real(wp), intent(inout), contiguous :: states(:, :)
 
+      self%steps_done(steps_recorded) = self%steps_done(steps_recorded) + self%steps
       if (self%by_newmark) then
          call advance_newmark(self%rule, self%pitch, states, self%smallest, self%largest, record=self%record)
       else

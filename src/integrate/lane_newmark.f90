@@ -125,7 +125,7 @@ contains
                   im(l, j) = im(l, j) - taken_im(l, j)*before(l)
                end do
             end do
-            if (present(record)) call keep(2*s)
+            if (present(record)) call keep(s)
             if (s == pitch%steps) exit
             before = 0.0_wp
          end if
@@ -144,14 +144,14 @@ contains
 
    contains
 
-      !> Record one place of the period.
-      subroutine keep(place)
-         !> Index of the place in the cycle.
-         integer, intent(in) :: place
+      !> Record the end of a step.
+      subroutine keep(step)
+         !> The step, from 0 where the period begins.
+         integer, intent(in) :: step
 
-         record%re(:, :modes, place) = re(:, :modes)
-         record%im(:, :modes, place) = im(:, :modes)
-         record%force(:, place) = n
+         record%re(:, :modes, step) = re(:, :modes)
+         record%im(:, :modes, step) = im(:, :modes)
+         record%force(:, step) = n
       end subroutine keep
 
    end subroutine advance_newmark

@@ -32,8 +32,6 @@ module spurflex_integrate_lane_rule
       real(wp), dimension(lanes, most_modes) :: half_re, half_im, full_re, full_im
       !> What N at each point takes from each mode over the step.
       real(wp), dimension(lanes, most_modes, points) :: taken_re, taken_im
-      !> The same over the first half of the step.
-      real(wp), dimension(lanes, most_modes, points) :: first_re, first_im
       !> What N at each point takes from the mesh deflection in the middle and at the end of the step [m/N].
       real(wp), dimension(lanes, points) :: middle, end
       !> Static mesh deflection [m], c_m times the mesh frequency [N/m], mean mesh force [N].
@@ -61,11 +59,9 @@ module spurflex_integrate_lane_rule
 
    !> A recorded period.
    type :: lane_record
-      !> The middles of the steps are recorded too.
-      logical :: middles = .true.
-      !> Modes at the ends and in the middle of every step, shape (lanes, most_modes, 0:2 steps).
+      !> Modes at the ends of the steps, shape (lanes, most_modes, 0:steps).
       real(wp), allocatable :: re(:, :, :), im(:, :, :)
-      !> N there, shape (lanes, 0:2 steps) [N].
+      !> N there, shape (lanes, 0:steps) [N].
       real(wp), allocatable :: force(:, :)
    end type lane_record
 
@@ -73,7 +69,7 @@ module spurflex_integrate_lane_rule
    type :: point_rule
       integer :: modes = 0
       real(wp), dimension(most_modes) :: half_re = 0.0_wp, half_im = 0.0_wp, full_re = 0.0_wp, full_im = 0.0_wp
-      real(wp), dimension(most_modes, points) :: taken_re = 0.0_wp, taken_im = 0.0_wp, first_re = 0.0_wp, first_im = 0.0_wp
+      real(wp), dimension(most_modes, points) :: taken_re = 0.0_wp, taken_im = 0.0_wp
       real(wp), dimension(points) :: middle = 0.0_wp, end = 0.0_wp
       real(wp) :: static = 0.0_wp, damping = 0.0_wp, force = 0.0_wp
    end type point_rule
@@ -122,8 +118,7 @@ contains
          rule%half_re(first:first + n - 1) = carry_re(:n)
          rule%half_im(first:first + n - 1) = carry_im(:n)
          do i = 1, points
-            rule%first_re(first:first + n - 1, i) = matmul(moment_re(:n, 0:2), parabola(:, i))
-            rule%first_im(first:first + n - 1, i) = matmul(moment_im(:n, 0:2), parabola(:, i))
+            rule%middle(i) = rule%middle(i) + sum(matmul(moment_re(:n, 0:2), parabola(:, i)))
          end do
          call set_point(place_of_end, y_re, y_im, b_re, b_im, carry_re, carry_im, moment_re, moment_im)
          rule%full_re(first:first + n - 1) = carry_re(:n)
@@ -134,14 +129,12 @@ contains
          end do
       end do
       do i = 1, points
-         rule%middle(i) = sum(rule%first_re(:rule%modes, i))
          rule%end(i) = sum(rule%taken_re(:rule%modes, i))
       end do
       ! The imaginary part of a real mode means nothing: what is put there is forgotten at once.
       do k = 1, modal%modes
          if (.not. modal%is_real(k)) cycle
          rule%taken_im(k, :) = 0.0_wp
-         rule%first_im(k, :) = 0.0_wp
       end do
    end subroutine new_point_rule
 
@@ -188,8 +181,6 @@ contains
          do i = 1, points
             rule%taken_re(lane, j, i) = point%taken_re(j, i)
             rule%taken_im(lane, j, i) = point%taken_im(j, i)
-            rule%first_re(lane, j, i) = point%first_re(j, i)
-            rule%first_im(lane, j, i) = point%first_im(j, i)
          end do
       end do
       rule%middle(lane, :) = point%middle

@@ -76,8 +76,7 @@ contains
          end do
          if (present(gain)) call set_gain(r, slope, added_slope, crosses, gain%n(:, :, :, s))
          if (present(record)) then
-            call keep(r, pitch, 2*s - 2, x(:, 1), re, im, record)
-            if (record%middles) call keep_middle(rule, pitch, 2*s - 1, x(:, 2), re, im, n, record)
+            call keep(r, pitch, s - 1, x(:, 1), re, im, record)
          end if
          do j = 1, r%modes
             do l = 1, lanes
@@ -88,7 +87,7 @@ contains
       end do
       states(:, :r%modes) = re(:, :r%modes)
       states(:, r%modes + 1:) = im(:, :r%modes)
-      if (present(record)) call keep(r, pitch, 2*pitch%steps, x(:, 3), re, im, record)
+      if (present(record)) call keep(r, pitch, pitch%steps, x(:, 3), re, im, record)
    end subroutine advance_lanes
 
    !> Carry tangents of every lane over the period whose derivatives were taken.
@@ -247,7 +246,7 @@ contains
       tangent_im = im(:, :r%modes)
    end subroutine carry_one
 
-   !> Copy the coefficients in use, but for those that only a record needs: copies on the stack are aligned to the vectors.
+   !> Copy the coefficients in use: copies on the stack are aligned to the vectors.
    pure subroutine copy_rule(rule, copy)
       !> Coefficients.
       type(lane_rule), intent(in) :: rule
@@ -271,45 +270,14 @@ contains
       copy%force = rule%force
    end subroutine copy_rule
 
-   !> Record the middle of a step.
-   pure subroutine keep_middle(rule, pitch, place, x, re, im, n, record)
+   !> Record the end of a step.
+   pure subroutine keep(rule, pitch, step, x, re, im, record)
       !> Coefficients.
       type(lane_rule), intent(in) :: rule
       !> The mesh.
       type(mesh_cycle), intent(in) :: pitch
-      !> Index of the middle in the cycle.
-      integer, intent(in) :: place
-      !> g.q there [m].
-      real(wp), intent(in) :: x(lanes)
-      !> Modes at the start of the step.
-      real(wp), intent(in) :: re(lanes, most_modes), im(lanes, most_modes)
-      !> N at the points of the step [N].
-      real(wp), intent(in) :: n(lanes, points)
-      !> Where to.
-      type(lane_record), intent(inout) :: record
-
-      real(wp), dimension(lanes, most_modes) :: middle_re, middle_im
-      integer :: j, l
-
-      do j = 1, rule%modes
-         do l = 1, lanes
-            middle_re(l, j) = rule%half_re(l, j)*re(l, j) - rule%half_im(l, j)*im(l, j) - rule%first_re(l, j, 1)*n(l, 1) &
-                              - rule%first_re(l, j, 2)*n(l, 2) - rule%first_re(l, j, 3)*n(l, 3)
-            middle_im(l, j) = rule%half_re(l, j)*im(l, j) + rule%half_im(l, j)*re(l, j) - rule%first_im(l, j, 1)*n(l, 1) &
-                              - rule%first_im(l, j, 2)*n(l, 2) - rule%first_im(l, j, 3)*n(l, 3)
-         end do
-      end do
-      call keep(rule, pitch, place, x, middle_re, middle_im, record)
-   end subroutine keep_middle
-
-   !> Record one place of the period.
-   pure subroutine keep(rule, pitch, place, x, re, im, record)
-      !> Coefficients.
-      type(lane_rule), intent(in) :: rule
-      !> The mesh.
-      type(mesh_cycle), intent(in) :: pitch
-      !> Index of the place in the cycle.
-      integer, intent(in) :: place
+      !> The step, from 0 where the period begins.
+      integer, intent(in) :: step
       !> g.q there [m].
       real(wp), intent(in) :: x(lanes)
       !> Modes there.
@@ -319,10 +287,10 @@ contains
 
       integer :: l
 
-      record%re(:, :rule%modes, place) = re(:, :rule%modes)
-      record%im(:, :rule%modes, place) = im(:, :rule%modes)
+      record%re(:, :rule%modes, step) = re(:, :rule%modes)
+      record%im(:, :rule%modes, step) = im(:, :rule%modes)
       do l = 1, lanes
-         record%force(l, place) = force_at(pitch, place, rule%static(l), rule%damping(l), rule%force(l), x(l))
+         record%force(l, step) = force_at(pitch, 2*step, rule%static(l), rule%damping(l), rule%force(l), x(l))
       end do
    end subroutine keep
 

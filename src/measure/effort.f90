@@ -2,11 +2,13 @@
 module spurflex_measure_effort
    use spurflex_base_kinds, only: wp, i8
    use spurflex_base_text, only: to_text, fixed_text
+   use spurflex_integrate_lane_ensemble, only: kinds_of_steps, steps_of_motions, steps_of_tangents, steps_recorded
+   use spurflex_integrate_lane_rule, only: lanes
    use spurflex_measure_response, only: response, contact_kept
    implicit none
    private
 
-   public :: effort_type, ways, stages, stage_search, stage_measure, stage_alone
+   public :: effort_type, ways, stages, kinds_of_steps, stage_search, stage_measure, stage_alone
 
    !> Ways: no contact loss, so that one monodromy gives the motion; Newton's method on a motion with contact loss; no periodic
    !> motion, so that the transient itself gives the class; alone, by the integrator of high order or dense Newmark steps.
@@ -22,6 +24,8 @@ module spurflex_measure_effort
       !> Points by way, seconds by stage.
       integer(i8) :: points(ways) = 0
       real(wp) :: seconds(stages) = 0.0_wp
+      !> Steps by kind, in all lanes at once.
+      integer(i8) :: steps(kinds_of_steps) = 0
       integer(i8), private :: since = 0
    contains
       !> Begin a stage.
@@ -75,11 +79,11 @@ contains
       self%points(way) = self%points(way) + 1
    end subroutine count_point
 
-   !> Points by way and time by stage.
+   !> Points by way, time by stage, steps by kind.
    pure function describe(self) result(text)
       !> Effort of all ranks.
       class(effort_type), intent(in) :: self
-      !> Two lines.
+      !> Three lines.
       character(len=:), allocatable :: text
 
       text = 'points by path: '//to_text(self%points(way_linear))//' linear (contact kept, one monodromy), ' &
@@ -87,7 +91,10 @@ contains
              //to_text(self%points(way_transient))//' transient (class by the exponent), ' &
              //to_text(self%points(way_alone))//' alone' &
              //new_line('a')//'time by path, all ranks: search '//fixed_text(self%seconds(stage_search), 2)//' s, measurement ' &
-             //fixed_text(self%seconds(stage_measure), 2)//' s, alone '//fixed_text(self%seconds(stage_alone), 2)//' s'
+             //fixed_text(self%seconds(stage_measure), 2)//' s, alone '//fixed_text(self%seconds(stage_alone), 2)//' s' &
+             //new_line('a')//'steps in '//to_text(lanes)//' lanes at once: '//to_text(self%steps(steps_of_motions)) &
+             //' of motions, '//to_text(self%steps(steps_of_tangents))//' of tangents, ' &
+             //to_text(self%steps(steps_recorded))//' recorded'
    end function describe
 
 end module spurflex_measure_effort

@@ -11,7 +11,10 @@ module spurflex_measure_lane_motion
    implicit none
    private
 
-   public :: measure_lanes
+   public :: measure_lanes, quarter_of, parts, begin_of_window, first_half, second_half
+
+   !> Parts of a window that are measured on their own.
+   integer, parameter :: begin_of_window = 1, first_half = 2, second_half = 3, parts = 3
 
    !> What is being measured in one seat.
    type :: measured_seat
@@ -19,8 +22,8 @@ module spurflex_measure_lane_motion
       integer :: item = 0
       !> Mesh periods done.
       integer :: done = 0
-      !> The whole, and its halves.
-      type(motion_measure) :: whole, half(2)
+      !> The whole, or the first and the second quarter and the second half.
+      type(motion_measure) :: section(parts)
       !> Extremes of the mesh deflection [m].
       real(wp) :: smallest = huge(1.0_wp), largest = -huge(1.0_wp)
    end type measured_seat
@@ -28,7 +31,7 @@ module spurflex_measure_lane_motion
 contains
 
    !> Measure motions over some mesh periods. A seat that becomes free is taken by the next at once.
-   subroutine measure_lanes(points, equations, views, part, view, members, periods, visitor, states, whole, halves)
+   subroutine measure_lanes(points, equations, views, part, view, members, periods, visitor, states, whole, of_parts)
       !> The points.
       type(lane_ensemble), intent(inout) :: points
       !> Equations of motion of each point, shape (points).
@@ -48,13 +51,13 @@ contains
       real(wp), intent(inout) :: states(:, :)
       !> Displacements and contact are filled in, shape (n).
       type(response), intent(inout) :: whole(:)
-      !> Displacements over the first and the second half, shape (2, n).
-      type(response), intent(inout), optional :: halves(:, :)
+      !> Displacements over the first quarter, the first and the second half, shape (parts, n).
+      type(response), intent(inout), optional :: of_parts(:, :)
 
       type(measured_seat) :: seats(points%seats)
       type(orbit_type) :: orbit
       real(wp) :: moving(points%seats, points%size)
-      integer :: next, k
+      integer :: next, k, part_of
 
       moving = 0.0_wp
       next = 1
@@ -62,9 +65,9 @@ contains
          do k = 1, points%seats
             if (seats(k)%item > 0 .or. next > size(members)) cycle
             seats(k) = measured_seat(item=next)
-            call seats(k)%whole%reset(equations(members(next))%static_observation)
-            call seats(k)%half(1)%reset(equations(members(next))%static_observation)
-            call seats(k)%half(2)%reset(equations(members(next))%static_observation)
+            do part_of = 1, parts
+               call seats(k)%section(part_of)%reset(equations(members(next))%static_observation)
+            end do
             call points%seat(k, members(next))
             call seat_view(view, k, views(part(members(next))))
             moving(k, :) = states(:, next)
@@ -78,24 +81,39 @@ contains
             if (seats(k)%item == 0) moving(k, :) = 0.0_wp
             if (seats(k)%item == 0) cycle
             associate (seat => seats(k), i => seats(k)%item)
-               call take_orbit(view, k, points%steps, points%record%middles, equations(members(i))%frequency, &
-                               orbit)
-               call seat%whole%add(orbit)
+               call take_orbit(view, k, points%steps, equations(members(i))%frequency, orbit)
                seat%done = seat%done + 1
-               if (present(halves)) call seat%half(merge(1, 2, 2*seat%done <= periods(i)))%add(orbit)
+               part_of = begin_of_window
+               if (present(of_parts)) part_of = 1 + count(seat%done > [quarter_of(periods(i)), periods(i)/2])
+               call seat%section(part_of)%add(orbit)
                seat%smallest = min(seat%smallest, points%smallest(k))
                seat%largest = max(seat%largest, points%largest(k))
                if (seat%done < periods(i)) cycle
                states(:, i) = moving(k, :)
-               call seat%whole%finish(whole(i))
+               if (present(of_parts)) then
+                  call seat%section(1)%finish(of_parts(begin_of_window, i))
+                  call seat%section(1)%join(seat%section(2))
+                  call seat%section(1)%finish(of_parts(first_half, i))
+                  call seat%section(3)%finish(of_parts(second_half, i))
+                  call seat%section(1)%join(seat%section(3))
+               end if
+               call seat%section(1)%finish(whole(i))
                whole(i)%contact = contact_of(seat%smallest, seat%largest, points%half_backlash)
-               if (present(halves)) call seat%half(1)%finish(halves(1, i))
-               if (present(halves)) call seat%half(2)%finish(halves(2, i))
                seat%item = 0
             end associate
          end do
          call visitor%attend()
       end do
    end subroutine measure_lanes
+
+   !> Mesh periods of the first quarter of a window.
+   elemental function quarter_of(periods) result(quarter)
+      !> Mesh periods of the window, two at least.
+      integer, intent(in) :: periods
+      !> One at least.
+      integer :: quarter
+
+      quarter = max(periods/4, 1)
+   end function quarter_of
 
 end module spurflex_measure_lane_motion

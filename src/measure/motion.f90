@@ -31,6 +31,8 @@ module spurflex_measure_motion
       procedure :: reset
       !> See one mesh period.
       procedure :: add
+      !> See what another measure of the same motion has seen.
+      procedure :: join
       !> Write what was found into a response.
       procedure :: finish
    end type motion_measure
@@ -82,6 +84,21 @@ contains
          call extremes(orbit%time(:last), square, rate, acceleration, ignored, self%largest_square(gear))
       end do
    end subroutine add
+
+   !> See what another measure of the same motion has seen.
+   pure subroutine join(self, other)
+      !> Measure.
+      class(motion_measure), intent(inout) :: self
+      !> The other measure.
+      class(motion_measure), intent(in) :: other
+
+      self%smallest = min(self%smallest, other%smallest)
+      self%largest = max(self%largest, other%largest)
+      self%total = self%total + other%total
+      self%total_square = self%total_square + other%total_square
+      self%periods = self%periods + other%periods
+      self%largest_square = max(self%largest_square, other%largest_square)
+   end subroutine join
 
    !> Extremes of a sampled quantity whose rates and accelerations are known.
    pure subroutine extremes(time, value, rate, acceleration, low, high)

@@ -186,6 +186,15 @@ def paths_in(log):
     return {"points": points, "seconds": seconds, "lines": lines}
 
 
+def steps_in(log):
+    """Steps of points in all lanes by kind, of all lines `steps in N lanes ...` of the log together."""
+    steps = {}
+    for lanes, kinds in re.findall(r"^steps in (\d+) lanes at once: (.*)$", log, flags=re.M):
+        for count, name in re.findall(r"(\d+) (?:of )?(\w+)", kinds):
+            steps[name] = steps.get(name, 0) + int(lanes) * int(count)
+    return steps
+
+
 # Result files ------------------------------------------------------------------------------------
 
 

@@ -202,10 +202,9 @@ contains
       integer, dimension(lanes) :: before, after
       integer :: s, lane, in_steps, in_points
 
-      record%middles = .false.
       associate (all_steps => kernel%pitch%steps)
-         allocate (record%re(lanes, most_modes, 0:2*all_steps), record%im(lanes, most_modes, 0:2*all_steps), &
-                   record%force(lanes, 0:2*all_steps), source=0.0_wp)
+         allocate (record%re(lanes, most_modes, 0:all_steps), record%im(lanes, most_modes, 0:all_steps), &
+                   record%force(lanes, 0:all_steps), source=0.0_wp)
          if (is_newmark(kernel%what)) then
             call advance_newmark(kernel%rule, kernel%pitch, kernel%states, smallest, largest, record=record)
          else
@@ -215,7 +214,7 @@ contains
          in_points = 0
          do s = 0, all_steps
             do lane = 1, lanes
-               deflection = kernel%rule%static(lane) + kernel%pitch%error(2*s) + sum(record%re(lane, :kernel%modes, 2*s))
+               deflection = kernel%rule%static(lane) + kernel%pitch%error(2*s) + sum(record%re(lane, :kernel%modes, s))
                after(lane) = 0
                if (abs(deflection) >= kernel%pitch%half_backlash) after(lane) = nint(sign(1.0_wp, deflection))
             end do
