@@ -38,6 +38,8 @@ module spurflex_integrate_collocation
       type(step_coefficients) :: whole, part
       !> Mesh at the points of every whole step, shape (steps).
       type(mesh_points), allocatable :: table(:)
+      !> What is recorded is the real part of this times the modes, shape (modes, quantities).
+      complex(wp), allocatable :: recorded(:, :)
    contains
       procedure :: load => load_collocation
       procedure :: advance => advance_collocation
@@ -73,6 +75,11 @@ contains
          self%weight = self%modal%weight
       end if
       self%equations = equations
+      if (allocated(equations%recorded)) then
+         self%recorded = transpose(matmul(equations%recorded, self%modal%from_modes(:equations%n, :)))
+      else
+         self%recorded = transpose(self%modal%observation)
+      end if
       self%half_backlash = equations%mesh%half_backlash
       self%period = 2.0_wp*pi/equations%frequency
       h = self%period/real(steps, wp)
@@ -107,8 +114,9 @@ contains
       self%smallest_deflection = huge(1.0_wp)
       self%largest_deflection = -huge(1.0_wp)
       if (present(orbit)) then
-         call reserve_orbit(orbit, self%steps*(most_crossings + 1)*(nodes - 1))
+         call reserve_orbit(orbit, self%steps*(most_crossings + 1)*(nodes - 1), size(self%recorded, 2))
          orbit%samples = 0
+         orbit%piece = nodes - 1
          orbit%weight = 0.0_wp
       end if
       branch = branch_of(self%table(1)%deflection(1) + sum(state(:self%modal%modes)), self%half_backlash)
@@ -177,16 +185,18 @@ contains
          self%smallest_deflection = min(self%smallest_deflection, minval(mesh%deflection + shift))
          self%largest_deflection = max(self%largest_deflection, maxval(mesh%deflection + shift))
          if (present(tangents)) call carry_tangents(step, alpha, tangents)
-         if (present(orbit)) call record(self%modal, step, mesh%time, self%period, state, force, orbit)
+         if (present(orbit)) call record(self%modal, self%recorded, step, mesh%time, self%period, state, force, orbit)
          call carry_state(step, force, nodes, state)
       end subroutine commit
 
    end subroutine advance_collocation
 
    !> Record the points of a step; the first one of the period too.
-   pure subroutine record(modal, step, time, period, state, force, orbit)
+   pure subroutine record(modal, recorded, step, time, period, state, force, orbit)
       !> The modes.
       type(modal_system), intent(in) :: modal
+      !> What is recorded of them, shape (modes, quantities).
+      complex(wp), intent(in), contiguous :: recorded(:, :)
       !> Coefficients.
       type(step_coefficients), intent(in) :: step
       !> Time of each point since the section [s].
@@ -201,8 +211,8 @@ contains
       type(orbit_type), intent(inout) :: orbit
 
       real(wp) :: at_point(size(state))
-      complex(wp) :: z(modal%modes), dz(modal%modes)
-      integer :: i, last, m
+      complex(wp) :: z(modal%modes), dz(modal%modes), d2z(modal%modes)
+      integer :: i, q, last, m
 
       m = modal%modes
       do i = merge(1, 2, orbit%samples == 0), nodes
@@ -215,10 +225,13 @@ contains
          z = cmplx(at_point(:m), at_point(m + 1:), wp)
          dz = modal%rate*z - modal%influence*force(i)
          orbit%time(last) = time(i)
-         orbit%value(:, last) = real(matmul(modal%observation, z), wp)
-         orbit%rate(:, last) = real(matmul(modal%observation, dz), wp)
          ! The rate of N does not reach the acceleration of a position.
-         orbit%acceleration(:, last) = real(matmul(modal%observation, modal%rate*dz), wp)
+         d2z = modal%rate*dz
+         do q = 1, size(recorded, 2)
+            orbit%value(q, last) = sum(real(recorded(:, q), wp)*real(z, wp) - aimag(recorded(:, q))*aimag(z))
+            orbit%rate(q, last) = sum(real(recorded(:, q), wp)*real(dz, wp) - aimag(recorded(:, q))*aimag(dz))
+            orbit%acceleration(q, last) = sum(real(recorded(:, q), wp)*real(d2z, wp) - aimag(recorded(:, q))*aimag(d2z))
+         end do
       end do
       last = orbit%samples
       orbit%weight(last - nodes + 1:last) = orbit%weight(last - nodes + 1:last) + quadrature*step%length/period

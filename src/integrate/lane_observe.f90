@@ -1,5 +1,5 @@
-!> What a recorded period of the lanes looks like: displacements, rates and accelerations at the ends and in the
-!> middle of every step.
+!> What a recorded period of the lanes looks like: displacements, rates and accelerations at the ends of its steps.
+!> The polynomials of degree five between them miss some 1e-5 of a motion with 16 steps, and less by the sixth power with more.
 module spurflex_integrate_lane_observe
    use spurflex_base_kinds, only: wp, pi
    use spurflex_integrate_lane_rule, only: lanes, most_modes, lane_record
@@ -25,7 +25,7 @@ module spurflex_integrate_lane_observe
    type :: lane_view
       private
       real(wp), allocatable :: re(:, :, :, :), im(:, :, :, :), force(:, :, :)
-      !> Values, rates and accelerations, shape (lanes, displacements, orders, 0:2 steps).
+      !> Values, rates and accelerations, shape (lanes, displacements, orders, 0:steps).
       real(wp), allocatable :: seen(:, :, :, :)
    end type lane_view
 
@@ -89,10 +89,10 @@ contains
       integer :: s, order, i, j, l
 
       if (allocated(self%seen)) then
-         if (ubound(self%seen, 4) < 2*steps) deallocate (self%seen)
+         if (ubound(self%seen, 4) < steps) deallocate (self%seen)
       end if
-      if (.not. allocated(self%seen)) allocate (self%seen(lanes, observables, orders, 0:2*steps))
-      do s = 0, 2*steps, merge(1, 2, record%middles)
+      if (.not. allocated(self%seen)) allocate (self%seen(lanes, observables, orders, 0:steps))
+      do s = 0, steps
          do order = 1, orders
             do i = 1, observables
                do l = 1, lanes
@@ -112,35 +112,32 @@ contains
    end subroutine observe
 
    !> The latest period of one lane.
-   subroutine take_orbit(self, lane, steps, middles, frequency, orbit)
+   subroutine take_orbit(self, lane, steps, frequency, orbit)
       !> View.
       type(lane_view), intent(in) :: self
       !> Lane.
       integer, intent(in) :: lane
       !> Steps per mesh period.
       integer, intent(in) :: steps
-      !> The middles of the steps were recorded too.
-      logical, intent(in) :: middles
       !> Mesh frequency [rad/s].
       real(wp), intent(in) :: frequency
       !> The period.
       type(orbit_type), intent(inout) :: orbit
 
-      integer :: s, samples, stride
+      integer :: s
 
-      samples = merge(2*steps, steps, middles)
-      stride = 2*steps/samples
-      call reserve_orbit(orbit, samples)
-      orbit%samples = samples
-      do s = 0, samples
-         orbit%time(s) = 2.0_wp*pi*real(s, wp)/(frequency*real(samples, wp))
-         orbit%weight(s) = 1.0_wp/real(samples, wp)
-         orbit%value(:, s) = self%seen(lane, :, 1, stride*s)
-         orbit%rate(:, s) = self%seen(lane, :, 2, stride*s)
-         orbit%acceleration(:, s) = self%seen(lane, :, 3, stride*s)
+      call reserve_orbit(orbit, steps)
+      orbit%samples = steps
+      orbit%piece = 1
+      do s = 0, steps
+         orbit%time(s) = 2.0_wp*pi*real(s, wp)/(frequency*real(steps, wp))
+         orbit%weight(s) = 1.0_wp/real(steps, wp)
+         orbit%value(:, s) = self%seen(lane, :, 1, s)
+         orbit%rate(:, s) = self%seen(lane, :, 2, s)
+         orbit%acceleration(:, s) = self%seen(lane, :, 3, s)
       end do
       ! The trapezoidal rule is exact beyond every order for a periodic motion that is smooth.
-      orbit%weight([0, samples]) = 0.5_wp/real(samples, wp)
+      orbit%weight([0, steps]) = 0.5_wp/real(steps, wp)
    end subroutine take_orbit
 
 end module spurflex_integrate_lane_observe

@@ -33,7 +33,9 @@ module spurflex_integrate_newmark
       real(wp), allocatable, private :: carry(:, :), before(:), after(:)
       !> Rows that give the mesh deflection and its rate, shape (size, 2).
       real(wp), allocatable, private :: deflection_row(:, :)
-      !> Observed accelerations from the state, shape (observables, size), and from the mesh force, shape (observables).
+      !> Rows that give what is recorded from the coordinates, shape (quantities, n).
+      real(wp), allocatable, private :: recorded(:, :)
+      !> Recorded accelerations from the state, shape (quantities, size), and from the mesh force, shape (quantities).
       real(wp), allocatable, private :: acceleration(:, :), acceleration_force(:)
       !> Mesh stiffness, delta_s + e_m and its rate at each step, shape (0:steps).
       real(wp), allocatable, private :: stiffness(:), deflection(:), deflection_rate(:)
@@ -86,8 +88,13 @@ contains
 
       self%deflection_row = reshape([equations%direction, 0.0_wp*equations%direction, &
                                      0.0_wp*equations%direction, equations%direction], [2*n, 2])
-      self%acceleration_force = -matmul(equations%observation, matmul(inverse_mass, equations%direction))
-      self%acceleration = -matmul(equations%observation, matmul(inverse_mass, diagonals(equations)))
+      if (allocated(equations%recorded)) then
+         self%recorded = equations%recorded
+      else
+         self%recorded = equations%observation
+      end if
+      self%acceleration_force = -matmul(self%recorded, matmul(inverse_mass, equations%direction))
+      self%acceleration = -matmul(self%recorded, matmul(inverse_mass, diagonals(equations)))
       reference = sqrt(equations%mesh%mean_stiffness*dot_product(equations%direction, &
                                                                  matmul(inverse_mass, equations%direction)))
       self%weight = [abs(equations%direction), abs(equations%direction)/reference]
@@ -187,7 +194,10 @@ contains
       real(wp), allocatable :: tangent_force(:)
       integer :: s
 
-      if (present(orbit)) call reserve_orbit(orbit, self%steps)
+      if (present(orbit)) then
+         call reserve_orbit(orbit, self%steps, size(self%recorded, 1))
+         orbit%piece = 1
+      end if
       h_d = dot_product(self%deflection_row(:, 1), self%after)
       h_v = dot_product(self%deflection_row(:, 2), self%after)
       associate (mesh => self%equations%mesh, mean => self%equations%mean_force, row => self%deflection_row)
@@ -256,8 +266,8 @@ contains
       orbit%samples = sample
       orbit%time(sample) = self%period*real(sample, wp)/real(self%steps, wp)
       orbit%weight(sample) = merge(0.5_wp, 1.0_wp, sample == 0 .or. sample == self%steps)/real(self%steps, wp)
-      orbit%value(:, sample) = matmul(self%equations%observation, state(:n))
-      orbit%rate(:, sample) = matmul(self%equations%observation, state(n + 1:))
+      orbit%value(:, sample) = matmul(self%recorded, state(:n))
+      orbit%rate(:, sample) = matmul(self%recorded, state(n + 1:))
       orbit%acceleration(:, sample) = matmul(self%acceleration, state) + self%acceleration_force*force
    end subroutine record
 

@@ -11,18 +11,20 @@ module spurflex_integrate_period_map
 
    public :: period_map, orbit_type, observables, reserve_orbit
 
-   !> Quantities recorded along an orbit: y1, d_x1, d_y1, d_x2, d_y2.
+   !> Quantities recorded along an orbit where the equations name no others: y1, d_x1, d_y1, d_x2, d_y2.
    integer, parameter :: observables = 5
 
    !> Observed quantities over one mesh period, as deviations from the static equilibrium.
    type :: orbit_type
       !> Samples after the first.
       integer :: samples = 0
+      !> Samples from one place where derivatives may jump to the next.
+      integer :: piece = 1
       !> Time since the section, shape (0:) [s].
       real(wp), allocatable :: time(:)
       !> Weight of each sample in the mean over the period, shape (0:); they add up to one.
       real(wp), allocatable :: weight(:)
-      !> Quantities, their rates and accelerations in time, shape (observables, 0:) [m, m/s, m/s2].
+      !> Quantities, their rates and accelerations in time, shape (quantities, 0:) [m, m/s, m/s2].
       real(wp), allocatable :: value(:, :), rate(:, :), acceleration(:, :)
    end type orbit_type
 
@@ -125,19 +127,24 @@ module spurflex_integrate_period_map
 contains
 
    !> Make room for some samples.
-   pure subroutine reserve_orbit(orbit, samples)
+   pure subroutine reserve_orbit(orbit, samples, quantities)
       !> Orbit.
       type(orbit_type), intent(inout) :: orbit
       !> Samples after the first that will be recorded at most.
       integer, intent(in) :: samples
+      !> Quantities; `observables` if absent.
+      integer, intent(in), optional :: quantities
 
+      integer :: rows
+
+      rows = observables
+      if (present(quantities)) rows = quantities
       if (allocated(orbit%time)) then
-         if (ubound(orbit%time, 1) >= samples) return
+         if (ubound(orbit%time, 1) >= samples .and. size(orbit%value, 1) == rows) return
          deallocate (orbit%time, orbit%weight, orbit%value, orbit%rate, orbit%acceleration)
       end if
       allocate (orbit%time(0:samples), orbit%weight(0:samples), source=0.0_wp)
-      allocate (orbit%value(observables, 0:samples), orbit%rate(observables, 0:samples), &
-                orbit%acceleration(observables, 0:samples), source=0.0_wp)
+      allocate (orbit%value(rows, 0:samples), orbit%rate(rows, 0:samples), orbit%acceleration(rows, 0:samples), source=0.0_wp)
    end subroutine reserve_orbit
 
 end module spurflex_integrate_period_map

@@ -8,8 +8,9 @@ module spurflex_measure_lane_solver
    use spurflex_integrate_lane_observe, only: point_view, new_point_view, lane_view
    use spurflex_integrate_options, only: solver_options, integrator_newmark
    use spurflex_integrate_steps, only: aim, better_lane_steps, newmark_lane_steps
-   use spurflex_measure_lane_motion, only: measure_lanes
-   use spurflex_measure_response, only: response, empty_response, describe_motion, relative_difference, status_inaccurate
+   use spurflex_measure_lane_motion, only: measure_lanes, quarter_of, parts, begin_of_window, first_half, second_half
+   use spurflex_measure_response, only: response, empty_response, describe_motion, relative_difference, status_inaccurate, &
+      reason_given_steps
    use spurflex_model_equations, only: equations_type
    use spurflex_model_modal, only: modal_system, new_modal_system, same_modes
    use spurflex_steady_outcome, only: steady_motion
@@ -142,7 +143,9 @@ contains
                call describe_motion(motions(p), answers(p))
                if (solver%options%steps_per_period > 0) then
                   complete(p) = .true.
-                  if (.not. error <= solver%options%tolerance) answers(p)%status = status_inaccurate
+                  if (error <= solver%options%tolerance) cycle
+                  answers(p)%status = status_inaccurate
+                  answers(p)%reason = reason_given_steps
                else
                   complete(p) = error <= aim*solver%options%tolerance
                   if (.not. complete(p)) steps(p) = better_lane_steps(next, error, solver%options)
@@ -273,8 +276,6 @@ contains
       integer, intent(in) :: part(:)
 
       ! One more than twice as many: where the grids nest, a crossing can leave both with the same part of a step behind it.
-      ! They are enough to be looked at at their ends only.
-      solver%judge%with_middles = .false.
       call solver%judge%load(equations, solver%modal, part, 2*merge(solver%steps, solver%points%steps, solver%by_newmark()) + 1)
    end subroutine load_judge
 
@@ -339,26 +340,26 @@ contains
          !> Which of the points.
          integer, intent(in) :: group(:)
 
-         type(response) :: whole(size(group)), judgement(size(group)), halves(2, size(group))
+         type(response) :: whole(size(group)), judgement(size(group)), of_parts(parts, size(group))
          real(wp) :: states(solver%points%size, size(group)), judged(solver%points%size, size(group))
          integer :: periods(size(group)), k
 
          whole = answers(group)
          judgement = whole
-         halves = empty_response()
+         of_parts = empty_response()
          periods = max(solver%options%measured_periods, 2)
          do k = 1, size(group)
             states(:, k) = motions(group(k))%state
          end do
          judged = states
-         call measure_lanes(solver%judge, equations, solver%views, part, solver%view, group, periods/2, visitor, judged, &
-                            judgement)
+         call measure_lanes(solver%judge, equations, solver%views, part, solver%view, group, quarter_of(periods), visitor, &
+                            judged, judgement)
          call measure_lanes(solver%points, equations, solver%views, part, solver%view, group, periods, visitor, states, whole, &
-                            halves)
+                            of_parts)
          do k = 1, size(group)
             associate (p => group(k))
-               whole(k)%error_estimate = max(relative_difference(equations(p), halves(1, k), halves(2, k)), &
-                                             relative_difference(equations(p), halves(1, k), judgement(k)))
+               whole(k)%error_estimate = max(relative_difference(equations(p), of_parts(first_half, k), of_parts(second_half, k)), &
+                                             relative_difference(equations(p), of_parts(begin_of_window, k), judgement(k)))
                motions(p)%state = states(:, k)
                call describe_motion(motions(p), whole(k))
                answers(p) = whole(k)

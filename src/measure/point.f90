@@ -5,6 +5,7 @@
 !> difference is the error estimate. Where the step is free it is halved until the estimate meets the tolerance. The numbers
 !> of a motion that is not periodic depend on the window: their estimate is what its halves, or two integrators, differ by.
 module spurflex_measure_point
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use spurflex_base_attendant, only: attendant
    use spurflex_base_error, only: error_type
    use spurflex_base_kinds, only: wp
@@ -16,8 +17,8 @@ module spurflex_measure_point
    use spurflex_integrate_steps, only: first_steps, better_steps, most_steps
    use spurflex_measure_motion, only: motion_measure
    use spurflex_measure_response, only: response, empty_response, status_missing, status_inaccurate, &
-      status_diverged, contact_of, &
-      describe_motion, relative_difference
+      status_diverged, reason_non_finite, reason_no_step, reason_given_steps, reason_most_steps, reason_not_confirmed, &
+      contact_of, describe_motion, relative_difference
    use spurflex_model_equations, only: equations_type
    use spurflex_steady_outcome, only: steady_motion
    use spurflex_steady_search, only: find_steady_motion, describe_orbit
@@ -78,9 +79,11 @@ contains
 
       answer = empty_response()
       answer%status = status_diverged
+      answer%reason = reason_no_step
       steps = solver%options%steps_per_period
       if (steps == 0) steps = first_steps(equations, solver%options)
       accurate = .false.
+      agreed = .false.
       known = motion%status /= status_missing
       is_free = solver%options%steps_per_period == 0 .and. solver%options%integrator == integrator_newmark
       if (is_free .and. .not. known) then
@@ -110,6 +113,13 @@ contains
          if (motion%periods == 0) then
             call measure_window(solver, equations, visitor, motion, answer)
             accurate = .true.
+            if (.not. all(ieee_is_finite(motion%state))) then
+               answer = empty_response()
+               answer%status = status_diverged
+               answer%reason = reason_non_finite
+               answer%periods_integrated = motion%periods_integrated
+               return
+            end if
             exit
          end if
          call measure_periods(solver%map, motion%periods, motion%state, equations, solver%orbit, answer)
@@ -121,7 +131,13 @@ contains
          known = agreed
       end do
       call solver%map%from_state(motion%state, position, velocity)
-      if (.not. accurate) answer%status = status_inaccurate
+      if (accurate) return
+      answer%status = status_inaccurate
+      if (.not. agreed) then
+         answer%reason = reason_not_confirmed
+      else
+         answer%reason = merge(reason_given_steps, reason_most_steps, solver%options%steps_per_period > 0)
+      end if
    end subroutine respond_alone
 
    !> Find a motion again, near where it was with larger steps; it must still be stable and take as long.

@@ -85,6 +85,7 @@ contains
       type(response), intent(out) :: answers(:)
 
       type(steady_motion) :: motions(size(equations))
+      type(equations_type), allocatable :: chosen(:)
       real(wp), dimension(size(positions, 1), size(positions, 2)) :: start_positions, start_velocities
       real(wp), allocatable :: position(:), velocity(:)
       integer :: steps(size(equations)), part(size(equations)), i, k
@@ -105,10 +106,13 @@ contains
          do i = 1, size(equations)
             if (steps(i) > most_lane_steps .or. any(steps(:i - 1) == steps(i))) cycle
             group = pack([(k, k=1, size(equations))], steps == steps(i))
-            call respond_in_lanes(solver%lanes, equations(group), part(group), steps(i), positions, velocities, group, visitor, &
+            ! Given as an argument, `equations(group)` would be a copy whose components gfortran never frees.
+            chosen = equations(group)
+            call respond_in_lanes(solver%lanes, chosen, part(group), steps(i), positions, velocities, group, visitor, &
                                   solver%effort, motions, answers, done)
          end do
       end if
+      solver%effort%steps = solver%lanes%points%steps_done + solver%lanes%judge%steps_done
       do i = 1, size(equations)
          if (done(i)) then
             call solver%effort%count_point(answers(i), motions(i)%periods > 0, alone=.false.)

@@ -4,12 +4,16 @@ module spurflex_measure_response
    use spurflex_base_kinds, only: wp
    use spurflex_model_equations, only: equations_type
    use spurflex_steady_outcome, only: status_missing, status_settled, status_not_settled, status_diverged, status_inaccurate, &
-      contact_kept, contact_lost, contact_both_flanks, motion_unresolved, motion_quasi_periodic, motion_chaotic, steady_motion
+      reason_none, reason_non_finite, reason_no_step, reason_max_periods, reason_given_steps, reason_most_steps, &
+      reason_not_confirmed, contact_kept, contact_lost, contact_both_flanks, motion_unresolved, motion_quasi_periodic, &
+      motion_chaotic, steady_motion
    implicit none
    private
 
    public :: response, empty_response, nan, contact_of, describe_motion, relative_difference
    public :: status_missing, status_settled, status_not_settled, status_diverged, status_inaccurate
+   public :: reason_none, reason_non_finite, reason_no_step, reason_max_periods, reason_given_steps, reason_most_steps, &
+      reason_not_confirmed
    public :: contact_kept, contact_lost, contact_both_flanks
    public :: motion_unresolved, motion_quasi_periodic, motion_chaotic
 
@@ -38,6 +42,8 @@ module spurflex_measure_response
       integer :: motion
       !> `status_...`.
       integer :: status
+      !> Why it is not settled: `reason_...`.
+      integer :: reason
       !> Mesh periods integrated to find the motion.
       integer :: periods_integrated
       !> `contact_...`.
@@ -70,6 +76,7 @@ contains
       empty%lyapunov_error = nan()
       empty%motion = motion_unresolved
       empty%status = status_missing
+      empty%reason = reason_none
       empty%periods_integrated = 0
       empty%contact = contact_kept
    end function empty_response
@@ -82,6 +89,7 @@ contains
       type(response), intent(inout) :: answer
 
       answer%status = motion%status
+      answer%reason = motion%reason
       answer%motion = motion%motion
       answer%periods_integrated = motion%periods_integrated
       answer%lyapunov_exponent = motion%lyapunov_exponent

@@ -21,7 +21,7 @@ module spurflex_model_equations
    implicit none
    private
 
-   public :: equations_type, new_equations, rest_deviation, paper_coordinates, mean_mesh_force
+   public :: equations_type, new_equations, rest_deviation, paper_coordinates, coordinate_rows, mean_mesh_force
    public :: rigid_dof, flexible_dof
 
    !> Degrees of freedom integrated on a rigid and on a flexible support.
@@ -56,6 +56,10 @@ module spurflex_model_equations
       real(wp) :: static_observation(5) = 0.0_wp
       !> Static equilibrium in these coordinates measured from zero displacement, shape (n).
       real(wp), allocatable :: static_position(:)
+      !> Rotation of each gear for a unit of p, the common rotation taken out [1/m].
+      real(wp) :: rotation(2) = 0.0_wp
+      !> Rows that give what a period map records from the coordinates, shape (quantities, n); `observation` where there are none.
+      real(wp), allocatable :: recorded(:, :)
    end type equations_type
 
 contains
@@ -78,6 +82,7 @@ contains
       equations%frequency = mesh_frequency(gears%teeth_1, point%speed)
       equations%mean_force = mean_mesh_force(gears, load)
       equations%static_deflection = static_mesh_deflection(gears%mesh, equations%mean_force)
+      equations%rotation = transmission_mass(gears)*gears%base_radius/gears%inertia*[1.0_wp, -1.0_wp]
       if (point%support == support_flexible) then
          call assemble_flexible(equations, gears, box, point)
       else
@@ -220,16 +225,42 @@ contains
       deviation = -equations%static_position
    end function rest_deviation
 
-   !> The paper's coordinates from the deviation: displacement if `position`, rate otherwise.
+   !> Rows that give the paper's coordinates x1, y1, th1, x2, y2, th2 [, xM, yM, thM].
    !>
-   !> The common rotation of the gears, which the mesh does not see, is taken as zero: J1 r2 th1 + J2 r1 th2 = 0.
-   pure function paper_coordinates(equations, gears, box, deviation, is_position) result(q)
+   !> The common rotation of the gears, which the mesh does not see, is taken as zero: J1 r2 th1 + J2 r1 th2 = 0. It obeys
+   !> (J1 r2 th1 + J2 r1 th2)'' = r2 T_d - r1 T_l, so that what is left out is the uniform rotation, and where the torques do not
+   !> balance the uniform acceleration.
+   pure function coordinate_rows(equations) result(rows)
       !> Equations of motion.
       type(equations_type), intent(in) :: equations
-      !> Gear pair.
-      type(gear_pair), intent(in) :: gears
-      !> Gearbox; unused on a rigid support.
-      type(gearbox), intent(in) :: box
+      !> Rows, shape (6, n) or (9, n).
+      real(wp), allocatable :: rows(:, :)
+
+      if (equations%n == flexible_dof) then
+         allocate (rows(9, flexible_dof), source=0.0_wp)
+         rows(1, [idx1, ixm]) = 1.0_wp
+         rows(2, :) = equations%observation(1, :)
+         rows(3, ip) = equations%rotation(1)
+         rows(4, [idx2, ixm]) = 1.0_wp
+         rows(5, [idy2, iym]) = 1.0_wp
+         rows(5, itm) = -rows(2, itm)
+         rows(6, ip) = equations%rotation(2)
+         rows(7, ixm) = 1.0_wp
+         rows(8, iym) = 1.0_wp
+         rows(9, itm) = 1.0_wp
+      else
+         allocate (rows(6, rigid_dof), source=0.0_wp)
+         ! Without a support that moves, displacements are bearing deformations.
+         rows([1, 2, 4, 5], :) = equations%observation(2:, :)
+         rows(3, irp) = equations%rotation(1)
+         rows(6, irp) = equations%rotation(2)
+      end if
+   end function coordinate_rows
+
+   !> The paper's coordinates from the deviation: displacement if `position`, rate otherwise.
+   pure function paper_coordinates(equations, deviation, is_position) result(q)
+      !> Equations of motion.
+      type(equations_type), intent(in) :: equations
       !> Deviation from the static equilibrium, or its rate, shape (n).
       real(wp), intent(in) :: deviation(:)
       !> The deviation is a position, not a rate.
@@ -237,19 +268,10 @@ contains
       !> x1, y1, th1, x2, y2, th2 [, xM, yM, thM], shape (6) or (9).
       real(wp), allocatable :: q(:)
 
-      real(wp) :: z(flexible_dof), share(2), sine, cosine
-
-      z = 0.0_wp
-      z(:equations%n) = deviation
-      if (is_position) z(:equations%n) = z(:equations%n) + equations%static_position
-      share = transmission_mass(gears)*gears%base_radius/gears%inertia*[1.0_wp, -1.0_wp]
-      if (equations%n == flexible_dof) then
-         q = [z(idx1) + z(ixm), z(idy1) + z(iym) - box%gear_offset*z(itm), share(1)*z(ip), &
-            z(idx2) + z(ixm), z(idy2) + z(iym) + box%gear_offset*z(itm), share(2)*z(ip), z(ixm), z(iym), z(itm)]
+      if (is_position) then
+         q = matmul(coordinate_rows(equations), equations%static_position + deviation)
       else
-         sine = sin(gears%pressure_angle)
-         cosine = cos(gears%pressure_angle)
-         q = [sine*z(iu1), -cosine*z(iu1), share(1)*z(irp), sine*z(iu2), -cosine*z(iu2), share(2)*z(irp)]
+         q = matmul(coordinate_rows(equations), deviation)
       end if
    end function paper_coordinates
 

@@ -7,8 +7,8 @@ module spurflex_model_mesh
    implicit none
    private
 
-   public :: mesh_stiffness, transmission_error, transmission_error_rate
-   public :: backlash_deflection, mesh_force, smallest_mesh_stiffness
+   public :: mesh_stiffness, mesh_stiffness_rate, transmission_error, transmission_error_rate, transmission_error_curvature
+   public :: backlash_deflection, mesh_force, mesh_force_rate, smallest_mesh_stiffness
 
 contains
 
@@ -29,6 +29,24 @@ contains
       end do
       stiffness = mesh%mean_stiffness*stiffness
    end function mesh_stiffness
+
+   !> Derivative of the mesh stiffness by the phase, d k_m / d(w_m t) [N/(m rad)].
+   pure function mesh_stiffness_rate(mesh, phase) result(rate)
+      !> Excitation.
+      type(mesh_excitation), intent(in) :: mesh
+      !> Phase w_m t [rad].
+      real(wp), intent(in) :: phase
+      !> Derivative at that phase; times w_m it is the rate in time.
+      real(wp) :: rate
+
+      integer :: n
+
+      rate = 0.0_wp
+      do n = 1, size(mesh%stiffness_coefficients)
+         rate = rate + real(n, wp)*mesh%stiffness_coefficients(n)*cos(real(n, wp)*phase + mesh%stiffness_phases(n))
+      end do
+      rate = mesh%mean_stiffness*rate
+   end function mesh_stiffness_rate
 
    !> Static transmission error e_m, Eq. (2) [m].
    pure function transmission_error(mesh, phase) result(deviation)
@@ -64,6 +82,23 @@ contains
       end do
    end function transmission_error_rate
 
+   !> Second derivative of the static transmission error by the phase [m/rad2].
+   pure function transmission_error_curvature(mesh, phase) result(curvature)
+      !> Excitation.
+      type(mesh_excitation), intent(in) :: mesh
+      !> Phase w_m t [rad].
+      real(wp), intent(in) :: phase
+      !> Second derivative at that phase; times w_m**2 it is the acceleration.
+      real(wp) :: curvature
+
+      integer :: n
+
+      curvature = 0.0_wp
+      do n = 1, size(mesh%error_amplitudes)
+         curvature = curvature - real(n, wp)**2*mesh%error_amplitudes(n)*sin(real(n, wp)*phase + mesh%error_phases(n))
+      end do
+   end function transmission_error_curvature
+
    !> Elastic deflection of the teeth f(delta), Eq. (4) [m].
    elemental function backlash_deflection(delta, half_backlash) result(deflection)
       !> Relative displacement on the line of action [m].
@@ -97,6 +132,23 @@ contains
 
       force = mesh%damping*delta_rate + mesh_stiffness(mesh, phase)*backlash_deflection(delta, mesh%half_backlash)
    end function mesh_force
+
+   !> Rate of the mesh force [N/s]; at a border of the backlash that of the contact.
+   pure function mesh_force_rate(mesh, phase, frequency, delta) result(rate)
+      !> Excitation.
+      type(mesh_excitation), intent(in) :: mesh
+      !> Phase w_m t [rad].
+      real(wp), intent(in) :: phase
+      !> Mesh angular frequency w_m [rad/s].
+      real(wp), intent(in) :: frequency
+      !> Relative displacement on the line of action, its rate and its acceleration in time [m, m/s, m/s2].
+      real(wp), intent(in) :: delta(3)
+      !> d f_m / dt [N/s].
+      real(wp) :: rate
+
+      rate = mesh%damping*delta(3) + frequency*mesh_stiffness_rate(mesh, phase)*backlash_deflection(delta(1), mesh%half_backlash)
+      if (abs(delta(1)) >= mesh%half_backlash) rate = rate + mesh_stiffness(mesh, phase)*delta(2)
+   end function mesh_force_rate
 
    !> Smallest mesh stiffness over a mesh period, found among evenly spaced phases [N/m].
    pure function smallest_mesh_stiffness(mesh) result(smallest)

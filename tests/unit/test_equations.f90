@@ -114,7 +114,7 @@ contains
       scale = max(abs(torque)/gears%base_radius(1), 1.0_wp)
       do i = 1, size(points)
          equations = new_equations(gears, reference_box(), load, points(i))
-         q = paper_coordinates(equations, gears, reference_box(), spread(0.0_wp, 1, equations%n), .true.)
+         q = paper_coordinates(equations, spread(0.0_wp, 1, equations%n), .true.)
          delta = dot_product(mesh_direction(gears, points(i)), q)
          residual = matmul(stiffness_matrix(gears, reference_box(), points(i)), q) - torque_vector(load, points(i)) &
                     + mesh_direction(gears, points(i))*gears%mesh%mean_stiffness &
@@ -139,7 +139,7 @@ contains
       gears = reference_gears()
       do i = 1, size(stiffnesses)
          equations = new_equations(gears, reference_box(), reference_load(), flexible_point(1500.0_wp, stiffnesses(i)))
-         q = paper_coordinates(equations, gears, reference_box(), rest_deviation(equations), .true.)
+         q = paper_coordinates(equations, rest_deviation(equations), .true.)
          call check(error, maxval(abs(q)), 0.0_wp, 0.0_wp)
          if (allocated(error)) return
       end do
@@ -175,8 +175,8 @@ contains
          allocate (z(n), rate(n))
          call random%fill(-1.0_wp, 1.0_wp, z)
          call random%fill(-1.0_wp, 1.0_wp, rate)
-         q = paper_coordinates(equations, gears, box, z, .true.)
-         v = paper_coordinates(equations, gears, box, rate, .false.)
+         q = paper_coordinates(equations, z, .true.)
+         v = paper_coordinates(equations, rate, .false.)
          call check(error, dot_product(rate, matmul(equations%mass, rate)), &
                     dot_product(v, matmul(mass_matrix(gears, box, point), v)), tolerance, 'T', relative=.true.)
          if (allocated(error)) return
@@ -218,7 +218,7 @@ contains
          if (allocated(z)) deallocate (z)
          allocate (z(equations%n))
          call random%fill(-1.0e-4_wp, 1.0e-4_wp, z)
-         q = paper_coordinates(equations, gears, box, z, .true.)
+         q = paper_coordinates(equations, z, .true.)
          expected = [q(2), q(1), q(2), q(4), q(5)]
          if (point%support == support_flexible) then
             expected(2:) = [q(1) - q(7), q(2) - q(8) + box%gear_offset*q(9), q(4) - q(7), q(5) - q(8) - box%gear_offset*q(9)]
@@ -321,8 +321,8 @@ contains
       start = 1.0e-7_wp*[(real(s, wp), s=1, n)]
       rate = 1.0e-3_wp*[(real(n - s, wp), s=1, n)]
       state = map%to_state(start, rate)
-      call start_paper_motion(motion, gears, box, load, point, paper_coordinates(equations, gears, box, start, .true.), &
-                              paper_coordinates(equations, gears, box, rate, .false.), options%steps_per_period, &
+      call start_paper_motion(motion, gears, box, load, point, paper_coordinates(equations, start, .true.), &
+                              paper_coordinates(equations, rate, .false.), options%steps_per_period, &
                               options%newmark_beta, options%newmark_gamma)
       smallest = huge(smallest)
       largest = -huge(largest)
@@ -338,7 +338,7 @@ contains
             if (allocated(error)) return
          end do
          call map%from_state(state, position, velocity)
-         q = paper_coordinates(equations, gears, box, position, .true.)
+         q = paper_coordinates(equations, position, .true.)
          deflection = dot_product(mesh_direction(gears, point), q)
          call check(error, deflection, dot_product(mesh_direction(gears, point), motion%q), tolerance, 'g.q')
          if (allocated(error)) return

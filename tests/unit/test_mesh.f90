@@ -3,8 +3,8 @@ module test_mesh
    use cases, only: reference_gears
    use pseudo_random, only: random_stream
    use spurflex_base_kinds, only: wp, i8, pi
-   use spurflex_model_mesh, only: backlash_deflection, mesh_force, mesh_stiffness, smallest_mesh_stiffness, &
-      transmission_error, transmission_error_rate
+   use spurflex_model_mesh, only: backlash_deflection, mesh_force, mesh_force_rate, mesh_stiffness, mesh_stiffness_rate, &
+      smallest_mesh_stiffness, transmission_error, transmission_error_curvature, transmission_error_rate
    use spurflex_model_parameters, only: gear_pair, mesh_excitation
    use test_support, only: check, error_type, new_unittest, unittest_type
    implicit none
@@ -28,6 +28,8 @@ contains
                   new_unittest('mesh stiffness, Eq. 1', test_stiffness), &
                   new_unittest('transmission error, Eq. 2', test_error), &
                   new_unittest('derivative of the transmission error', test_error_rate), &
+                  new_unittest('further derivatives by the phase', test_derivatives), &
+                  new_unittest('rate of the mesh force', test_force_rate), &
                   new_unittest('period of 2 pi', test_period), &
                   new_unittest('backlash function, Eq. 4', test_backlash), &
                   new_unittest('backlash function is continuous', test_continuity), &
@@ -36,6 +38,84 @@ contains
                   new_unittest('smallest mesh stiffness', test_smallest) &
                   ]
    end subroutine collect_mesh
+
+   !> Rate of the stiffness and curvature of the transmission error against differences of fourth order.
+   subroutine test_derivatives(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      real(wp), parameter :: step = 1.0e-3_wp
+      !> Fourth power of the step, of the third harmonic, and round-off over the step; relative.
+      real(wp), parameter :: tolerance = 1.0e-10_wp
+      real(wp) :: phase, slope
+      integer :: i
+
+      do i = 0, phases
+         phase = 0.3_wp*real(i, wp)
+         slope = (8.0_wp*(mesh_stiffness(rich_mesh(), phase + step) - mesh_stiffness(rich_mesh(), phase - step)) &
+                  - mesh_stiffness(rich_mesh(), phase + 2.0_wp*step) + mesh_stiffness(rich_mesh(), phase - 2.0_wp*step)) &
+                 /(12.0_wp*step)
+         call check(error, mesh_stiffness_rate(rich_mesh(), phase), slope, tolerance*3.2e8_wp, 'stiffness')
+         if (allocated(error)) return
+         slope = (8.0_wp*(transmission_error_rate(rich_mesh(), phase + step) - transmission_error_rate(rich_mesh(), phase - step)) &
+                  - transmission_error_rate(rich_mesh(), phase + 2.0_wp*step) &
+                  + transmission_error_rate(rich_mesh(), phase - 2.0_wp*step))/(12.0_wp*step)
+         call check(error, transmission_error_curvature(rich_mesh(), phase), slope, tolerance*1.0e-5_wp, 'transmission error')
+         if (allocated(error)) return
+      end do
+   end subroutine test_derivatives
+
+   !> Along a motion through contact, gap and back flank, against differences where no border is near.
+   subroutine test_force_rate(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      real(wp), parameter :: frequency = 5.0e3_wp, step = 1.0e-3_wp/frequency
+      !> Fourth power of the step and round-off over it, relative.
+      real(wp), parameter :: tolerance = 1.0e-9_wp
+      real(wp) :: time, slope, largest
+      integer :: i, branches(-1:1)
+
+      branches = 0
+      largest = 3.2e8_wp*frequency*2.0e-5_wp
+      do i = 0, phases
+         time = 0.11_wp*real(i, wp)/frequency
+         if (abs(abs(deflection(time, 0)) - 1.0e-5_wp) < 1.0e-7_wp) cycle
+         slope = (8.0_wp*(force(time + step) - force(time - step)) - force(time + 2.0_wp*step) + force(time - 2.0_wp*step)) &
+                 /(12.0_wp*step)
+         call check(error, mesh_force_rate(rich_mesh(), frequency*time, frequency, [deflection(time, 0), deflection(time, 1), &
+                                                                                    deflection(time, 2)]), &
+                    slope, tolerance*largest, 'rate')
+         if (allocated(error)) return
+         branches(max(-1, min(1, int(deflection(time, 0)*1.0e5_wp)))) = 1
+      end do
+      call check(error, sum(branches), 3, 'branches met')
+
+   contains
+
+      !> A mesh deflection and its derivatives in time.
+      pure function deflection(time, order) result(value)
+         !> Time [s].
+         real(wp), intent(in) :: time
+         !> Which derivative.
+         integer, intent(in) :: order
+         !> Its value.
+         real(wp) :: value
+
+         value = 2.0e-5_wp*(1.3_wp*frequency)**order*sin(1.3_wp*frequency*time + 0.5_wp*pi*real(order, wp))
+      end function deflection
+
+      !> The mesh force on the way.
+      pure function force(time) result(value)
+         !> Time [s].
+         real(wp), intent(in) :: time
+         !> The force [N].
+         real(wp) :: value
+
+         value = mesh_force(rich_mesh(), frequency*time, deflection(time, 0), deflection(time, 1))
+      end function force
+
+   end subroutine test_force_rate
 
    !> An excitation of two stiffness and three error harmonics with phases.
    pure function rich_mesh() result(mesh)
