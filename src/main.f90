@@ -2,7 +2,7 @@
 program spurflex_main
    use mpi_f08, only: MPI_COMM_WORLD, mpi_abort, mpi_comm_rank, mpi_finalize, mpi_init
    use spurflex, only: action_check, action_help, action_keys, action_run, action_version, case_type, command_type, &
-      describe_plan, error_type, exit_complete, exit_process, key_reference, logger, new_logger, &
+      describe_ends, describe_plan, error_type, excerpt, exit_complete, exit_process, key_reference, logger, new_logger, &
       parse_command_line, run_case, share_case, usage, version_text
    implicit none
 
@@ -28,9 +28,9 @@ program spurflex_main
       case (action_check, action_run)
          call share_case(command%deck, MPI_COMM_WORLD, case, error)
          if (.not. allocated(error) .and. command%action == action_check) then
-            call log%say(case%resolved//new_line('a')//describe_plan(case))
+            call log%say(case%resolved//new_line('a')//describe_plan(case)//new_line('a')//describe_ends(case))
          else if (.not. allocated(error)) then
-            call log%say(version_text()//new_line('a')//'deck: '//command%deck)
+            call log%say(version_text()//new_line('a')//'deck: '//excerpt(command%deck))
             call run_case(case, MPI_COMM_WORLD, command%fresh, log, code, error)
          end if
       end select

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from result_files import write_result
+from result_files import write_motions, write_result
 
 from spurflex_postproc import style
 
@@ -37,3 +37,9 @@ def map_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def small_file(tmp_path: Path) -> Path:
     """Both supports, 3 stiffnesses x 5 speeds, to be damaged by a test."""
     return write_result(tmp_path / "small.h5", SPEED[:5], STIFFNESS[:3])
+
+
+@pytest.fixture(scope="session")
+def motions_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Both supports, the published sequence of motions, all products of y1 and x2."""
+    return write_motions(tmp_path_factory.mktemp("motions") / "figure3.h5")

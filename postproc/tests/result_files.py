@@ -126,3 +126,128 @@ def _describe(item: h5py.Dataset, name: str) -> None:
     unit = UNITS.get(name, "m" if metres else "1")
     item.attrs["units"] = np.bytes_(unit)
     item.attrs["long_name"] = np.bytes_(name.replace("_", " "))
+
+
+WINDOW = 840
+"""Mesh periods of the spectrum of recorded files."""
+SECOND = 0.37
+"""Order of the second frequency of what is flagged quasi-periodic."""
+
+
+def made_up_motion(flag: int, time: Reals, scale: float) -> tuple[Reals, Reals]:
+    """A motion of one class: value [m] and rate per mesh period at times in mesh periods."""
+    parts = [(1.0, 1.0, 0.3), (2.0, 0.25, 1.0)]
+    if flag == 20:
+        parts += [(SECOND, 0.4, 0.1), (1 - SECOND, 0.3, 0.7), (1 + SECOND, 0.2, 0.2)]
+    elif flag > 1:
+        flag %= 100
+        parts += [(at / flag, 0.5 / at, 0.4 * at) for at in range(1, 2 * flag) if at % flag]
+    value, rate = np.full(time.shape, 4 * scale), np.zeros(time.shape)
+    for order, height, phase in parts:
+        angle = 2 * np.pi * order * time + phase
+        value += scale * height * np.sin(angle)
+        rate += scale * height * 2 * np.pi * order * np.cos(angle)
+    return value, rate
+
+
+def made_up_spectrum(flag: int, scale: float, highest: float) -> Reals:
+    """Its amplitude spectrum up to an order, over as many lines as `WINDOW` gives [m]."""
+    whole = flag if 1 <= flag <= 8 else WINDOW
+    time = np.arange(64 * whole) / 64
+    value, _ = made_up_motion(flag, time, scale)
+    taper = np.ones(value.shape) if whole < WINDOW else 1 - np.cos(2 * np.pi * time / whole)
+    lines = 2 * np.abs(np.fft.rfft((value - value.mean()) * taper)) / len(time)
+    lines[0] = abs(value.mean())
+    found = np.zeros(round(highest * WINDOW) + 1)
+    step = WINDOW // whole
+    found[::step] = lines[: len(found[::step])]
+    return found
+
+
+def add_recordings(
+    path: Path,
+    *,
+    quantities: tuple[str, ...] = ("y1",),
+    highest: float = 4.0,
+    sections: int = 24,
+    periods: int = 8,
+    samples: int = 64,
+    scale: float = 1e-5,
+) -> Path:
+    """Add spectra, Poincare sections and histories of the flagged motions to a result file.
+
+    Args:
+        path: A file of `write_result`; its motion flags say what is recorded.
+        quantities: What is recorded.
+        highest: Highest order of the spectra.
+        sections: Points of the sections.
+        periods: Mesh periods of the histories.
+        samples: Samples of a mesh period.
+        scale: Amplitude of the motions at the first speed; it grows with the speed.
+
+    Returns:
+        The path.
+    """
+    with h5py.File(path, "r+") as file:
+        axes = {
+            "order": np.arange(round(highest * WINDOW) + 1) / WINDOW,
+            "section": np.arange(1.0, sections + 1),
+            "mesh_time": np.arange(periods * samples) / samples,
+        }
+        for name, values in axes.items():
+            scale_ = file.create_dataset(name, data=values)
+            scale_.make_scale(name)
+            _describe(scale_, name)
+        speed = file["speed"][:]
+        for prefix in ("", "rigid_"):
+            if f"{prefix}motion" not in file:
+                continue
+            flags = file[f"{prefix}motion"][:]
+            size = scale * np.broadcast_to(speed / speed[0], flags.shape) ** 0.5
+            for quantity in quantities:
+                made: dict[str, Reals] = {}
+                ending = "" if quantity == "y1" else f"_{quantity}"
+                history = f"history/{prefix}{quantity}"
+                for product, axis in (
+                    (f"{prefix}spectrum{ending}", "order"),
+                    (f"{prefix}poincare{ending}", "section"),
+                    (f"{prefix}poincare{ending}_rate", "section"),
+                    (history, "mesh_time"),
+                    (f"{history}_rate", "mesh_time"),
+                ):
+                    made[product] = np.full((*flags.shape, len(axes[axis])), np.nan)
+                    item = file.create_dataset(product, data=made[product])
+                    for at, name in enumerate(("support_stiffness", "speed")[-flags.ndim :]):
+                        item.dims[at].attach_scale(file[name])
+                    item.dims[flags.ndim].attach_scale(file[axis])
+                    item.attrs["units"] = np.bytes_("m/s" if product.endswith("rate") else "m")
+                    if axis == "order":
+                        item.attrs["window"] = np.bytes_("Hann over 840 mesh periods")
+                for at in np.ndindex(flags.shape):
+                    flag, height = int(flags[at]), float(size[at])
+                    file[f"{prefix}spectrum{ending}"][at] = made_up_spectrum(flag, height, highest)
+                    for name, time in (
+                        (f"{prefix}poincare{ending}", axes["section"] - 1),
+                        (history, axes["mesh_time"]),
+                    ):
+                        value, rate = made_up_motion(flag, time, height)
+                        file[name][at], file[f"{name}_rate"][at] = value, rate
+    return path
+
+
+def write_motions(path: Path) -> Path:
+    """Write a result of 20 speeds whose motions follow each other as published, and recordings.
+
+    1T to 4600, quasi-periodic to 4900, 3T to 5300, 1T to 5500, 2T to 6000 rev/min; on the rigid
+    support the first 2T point is one of 9T.
+    """
+    speed = np.arange(300.0, 6001.0, 300.0)
+    write_result(path, speed, np.array([2.5e8]))
+    flags = np.ones(speed.shape, dtype=np.int32)
+    for first, flag in ((4600, 20), (4900, 3), (5300, 1), (5500, 2)):
+        flags[speed > first] = flag
+    with h5py.File(path, "r+") as file:
+        file["motion"][0] = flags
+        flags[np.argmax(flags == 2)] = 109
+        file["rigid_motion"][...] = flags
+    return add_recordings(path, quantities=("y1", "x2"))

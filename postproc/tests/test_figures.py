@@ -4,6 +4,7 @@ from io import BytesIO
 from pathlib import Path
 
 import h5py
+import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.collections import QuadMesh
@@ -136,12 +137,25 @@ def test_map_holds_the_data(map_file: Path) -> None:
 def test_surface_holds_the_data(map_file: Path) -> None:
     with h5py.File(map_file) as file:
         amplitude = 1e6 * file["y1_amplitude"][:]
-    _, drawing = FIGURES["9"].draw(open_result(map_file), Options())
+    map_, drawing = FIGURES["9"].draw(open_result(map_file), Options())
     drawing.figure.draw_without_rendering()
     (surface,) = drawing.figure.axes[0].collections
-    assert len(surface.get_facecolor()) == (amplitude.shape[0] - 1) * (amplitude.shape[1] - 1)
+    m, n = amplitude.shape
+    corners = [amplitude[i : m - 1 + i, j : n - 1 + j] for i in (0, 1) for j in (0, 1)]
+    colours = mpl.colormaps["viridis"](amplitude_norm(amplitude)(sum(corners) / 4)).reshape(-1, 4)
+    drawn = np.asarray(surface.get_facecolor())
+    assert drawn.shape == colours.shape
+    # Sorted, for the perspective draws the farthest cells first.
+    np.testing.assert_allclose(np.sort(drawn, axis=0), np.sort(colours, axis=0), atol=1e-12)
     assert surface.get_rasterized()
     assert drawing.figure.axes[0].get_zlim()[1] >= amplitude.max()
+    (crest,) = [one for one in drawing.figure.axes[0].lines if one.get_gid() == "crest"]
+    (flat,) = [one for one in map_.figure.axes[0].lines if one.get_gid() == "crest"]
+    x, y, z = crest.get_data_3d()
+    there = np.isfinite(flat.get_xdata())
+    np.testing.assert_allclose(x, flat.get_xdata()[there])
+    np.testing.assert_allclose(10**y, flat.get_ydata()[there])
+    assert np.all((z > 0) & (z < 1.02 * amplitude.max()))
 
 
 def test_map_report(map_file: Path) -> None:

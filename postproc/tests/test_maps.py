@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from spurflex_postproc.features.areas import connected, lettered, signed_areas, stiff_border
-from spurflex_postproc.features.orders import dominant_order, find_orders
+from spurflex_postproc.features.orders import find_lines, second_frequency
 from spurflex_postproc.features.stiffness import transition
+from spurflex_postproc.published import published_points
 
 SPEED = np.arange(300.0, 6001.0, 30.0)
 STIFFNESS = np.logspace(3, 12, 46)
@@ -105,14 +106,30 @@ def test_lines_of_a_spectrum() -> None:
     amplitude = np.full(order.shape, 1e-6)
     for at, height in ((1 / 3, 0.2), (2 / 3, 1.0), (1.0, 0.5), (0.0, 9.0)):
         amplitude += height * np.exp(-(((order - at) / 0.004) ** 2))
-    assert dominant_order(order, amplitude) == pytest.approx(2 / 3, abs=1e-3)
-    assert find_orders(order, amplitude) == pytest.approx([2 / 3, 1.0, 1 / 3], abs=1e-3)
+    lines = find_lines(order, amplitude)
+    assert [line.order for line in lines] == pytest.approx([2 / 3, 1.0, 1 / 3], abs=1e-3)
+    assert [line.amplitude for line in lines] == pytest.approx([1.0, 0.5, 0.2], rel=0.25)
+
+
+def test_side_lobes_are_no_lines() -> None:
+    time = np.arange(840 * 16) / 16
+    value = np.sin(2 * np.pi * 0.3705 * time) + 0.1 * np.sin(2 * np.pi * time)
+    taper = 1 - np.cos(2 * np.pi * time / 840)
+    amplitude = 2 * np.abs(np.fft.rfft(value * taper)) / time.size
+    lines = find_lines(np.arange(amplitude.size) / 840, amplitude)
+    assert [line.order for line in lines] == pytest.approx([0.3705, 1.0], abs=1e-4)
 
 
 def test_spectrum_of_whole_orders() -> None:
-    assert find_orders([0, 0.5, 1.0, 1.5], [3.0, 0.0, 2.0, 0.0]) == [1.0]
-    assert dominant_order([0.5, 1.0], [1.0, 2.0]) == 1.0
-    with pytest.raises(ValueError, match="no positive"):
-        dominant_order([0.0], [1.0])
+    assert find_lines([0, 0.5, 1.0, 1.5], [3.0, 0.0, 2.0, 0.0]) == [(1.0, 2.0)]
+    assert find_lines([0.5, 1.0], [1.0, 2.0])[0].order == 1.0
+    assert find_lines([0.0], [1.0]) == []
     with pytest.raises(ValueError, match="shape"):
-        find_orders([0.0], [1.0, 2.0])
+        find_lines([0.0], [1.0, 2.0])
+
+
+def test_second_frequency() -> None:
+    (told,) = [point for point in published_points() if point.motion == "chaotic"]
+    assert second_frequency([told.dominant, *told.orders]) == pytest.approx(0.37)
+    assert second_frequency([1.0, 2 / 3, 1 / 3, 2.0]) is None
+    assert second_frequency([1.0, 0.1234, 0.3117, 0.4444]) is None

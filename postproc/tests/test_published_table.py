@@ -6,7 +6,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from result_files import write_result
+from result_files import add_recordings, write_result
 
 from spurflex_postproc import open_result
 from spurflex_postproc.markdown import table
@@ -17,7 +17,7 @@ from spurflex_postproc.published import (
     tolerance,
 )
 from spurflex_postproc.published_table.bearing import rank_correlation
-from spurflex_postproc.published_table.cli import main
+from spurflex_postproc.published_table.cli import build, main
 from spurflex_postproc.published_table.curves import curve_rows
 from spurflex_postproc.published_table.explain import explained
 from spurflex_postproc.published_table.regimes import point_rows, regime_rows
@@ -71,29 +71,73 @@ def test_rows_of_regimes(folder: Path) -> None:
 
 def test_rows_of_points(folder: Path) -> None:
     result = open_result(folder / "figure2-up.h5")
-    rows = {row.key: row for row in point_rows(result, [])}
+    rows = {row.key: row for row in point_rows([result])}
     assert rows["figure 4 motion"].agrees
     assert rows["figure 5 motion"].agrees
     assert rows["figure 8 motion"].agrees is False
     assert rows["figure 6 orders"].agrees is None
+    assert [row.key for row in point_rows([result], complete=False)] == [
+        f"figure {number} motion" for number in "45678"
+    ]
+    assert all(row.agrees is None for row in point_rows([]))
+
+
+def point(path: Path, start: str, speed: float, flag: int) -> Path:
+    """Write a result of one of the figures 4 to 8 with a spectrum."""
+    write_result(path, np.array([speed]), np.array([2.5e8]), support="flexible")
+    with h5py.File(path, "r+") as file:
+        file["motion"][...] = flag
+        file["provenance"]["resolved_deck"] = f"&sweep\n  start = '{start}'\n/\n"
+    return add_recordings(path)
 
 
 def test_rows_of_spectra(folder: Path) -> None:
-    path = folder / "figure6.h5"
-    write_result(path, np.array([5290.0, 5300.0]), np.array([2.5e8]))
-    order = np.arange(0, 10) / 3
-    lines = np.array([0, 0.2, 1, 0.5, 0.3, 0.2, 0.3, 0, 0.2, 0])
-    with h5py.File(path, "r+") as file:
-        scale = file.create_dataset("order", data=order)
-        scale.make_scale("order")
-        data = file.create_dataset("spectrum", data=np.array([[np.zeros(10), lines]]) * 1e-6)
-        for at, name in enumerate(("support_stiffness", "speed", "order")):
-            data.dims[at].attach_scale(file[name])
+    point(folder / "figure6.h5", "up", 5300.0, 3)
     sources = load(folder)
-    rows = {row.key: row for row in point_rows(sources.reference, sources.spectra)}
-    assert rows["figure 6 dominant"].agrees
-    assert rows["figure 6 orders"].agrees
+    rows = {row.key: row for row in point_rows([*sources.points, sources.reference])}
+    assert rows["figure 6 motion"].agrees
+    dominant = rows["figure 6 dominant"]
+    assert dominant.computed == pytest.approx(1.0)
+    assert dominant.agrees is False
+    assert dominant.note == "0.6667: 25.0 %"
+    # The made-up motion has no line at 8/3.
+    orders = rows["figure 6 orders"]
+    assert orders.agrees is False
+    assert orders.met == pytest.approx(5 / 6)
+    assert orders.note.startswith("lacking 2.667; 0.3333: 50.0 %; 1: 100.0 %")
     assert rows["figure 7 orders"].agrees is None
+
+
+def test_combinations_of_two_frequencies_are_told(folder: Path) -> None:
+    point(folder / "figure5.h5", "up", 4900.0, 20)
+    rows = {row.key: row for row in point_rows(load(folder).points, complete=False)}
+    assert rows["figure 5 motion"].computed == "quasi-periodic"
+    assert rows["figure 5 motion"].met == 0.5
+    assert "combinations of 1 and 0.370" in rows["figure 5 orders"].note
+    assert set(rows) == {f"figure 5 {name}" for name in ("motion", "dominant", "orders")}
+
+
+def test_points_with_other_settings_are_evidence(folder: Path) -> None:
+    point(folder / "figure8.h5", "up", 5900.0, 1)
+    point(folder / "figure8-rest.h5", "rest", 5900.0, 2)
+    point(folder / "figure8-static.h5", "static", 5900.0, 2)
+    sources = load(folder)
+    # The start 'static' is among the curves already.
+    assert [trial.label for trial in sources.point_trials] == ["start = 'rest'"]
+    rows, _, settings = build(sources)
+    found = {row.key: row for row in rows}
+    assert found["figure 8 motion"].explanation == ("with another start: start = 'rest' gives 2T")
+    assert "nearest: start = 'rest' gives" in found["figure 8 orders"].explanation
+    assert "lacking 3" in found["figure 8 orders"].explanation
+    label, kind_, some = settings[-1]
+    assert (label, kind_, len(some)) == ("start = 'rest'", "start", 3)
+
+
+def test_figure_3_stands_for_figure_2_with_the_same_settings(folder: Path) -> None:
+    curves(folder / "figure3.h5", "static")
+    sources = load(folder)
+    assert [trial.label for trial in sources.trials].count("start = 'static'") == 1
+    assert sources.curves["static"].attrs["path"].endswith("figure3.h5")
 
 
 def test_command(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -104,7 +148,11 @@ def test_command(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert figures == {*"23456789", "10a", "10b", "10c"}
     assert len(content["conclusions"]) == 4
     assert sum(content["counts"].values()) == len(content["rows"])
-    assert all(row["explanation"] for row in content["rows"] if row["agrees"] is False) is False
+    assert all(
+        row["explanation"]
+        for row in content["rows"]
+        if row["figure"] in "235678" and row["agrees"] is False
+    )
     text = (out / "published.md").read_text()
     assert "## Disagreements" in text
     assert "steps_per_period = 16" in text
@@ -130,6 +178,7 @@ def test_differences_of_decks() -> None:
     assert kind({"start": "x"}) == "start"
     assert kind({"start": "x", "integrator": "y"}) == "step"
     assert kind({"start": "x", "damping": "y"}) == "parameter"
+    assert kind({"start": "x", "damping": "y", "integrator": "z"}) == "both"
 
 
 def test_explanations(folder: Path) -> None:
@@ -146,8 +195,8 @@ def test_explanations(folder: Path) -> None:
         (Trial("start = 'rest'", "start", result), rows(1005.0)),
     ]
     first, second = explained(rows(1100.0), trials, {"s": "known"})
-    assert first.explanation == "the start decides: start = 'rest' gives 1005 (+0.5 %)"
-    assert second.explanation == "a parameter decides: damping = 1 gives no; known"
+    assert first.explanation == "with another start: start = 'rest' gives 1005 (+0.5 %)"
+    assert second.explanation == "with another parameter: damping = 1 gives no; known"
     (alone, _) = explained(rows(None), [(trials[0][0], rows(1050.0))], {})
     assert "nearest of 1 other settings" in alone.explanation
     (far, _) = explained(rows(1020.0), [(trials[0][0], rows(1050.0))], {})

@@ -148,3 +148,13 @@ def test_speeds_out_of_order(small_file: Path) -> None:
         file["speed"][2] = 1.0
     with pytest.raises(ResultError, match="not positive and ascending"):
         open_result(small_file)
+
+
+def test_infinite_estimate_is_no_damage(small_file: Path) -> None:
+    with h5py.File(small_file, "r+") as file:
+        file["error_estimate"][0, 1] = np.inf
+    assert np.isposinf(open_result(small_file)["error_estimate"].values[0, 1])
+    with h5py.File(small_file, "r+") as file:
+        file["y1_amplitude"][0, 1] = np.inf
+    with pytest.raises(ResultError, match="'y1_amplitude' holds impossible numbers"):
+        open_result(small_file)

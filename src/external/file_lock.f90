@@ -15,6 +15,8 @@ module spurflex_external_file_lock
    integer(c_int), parameter :: error_would_block = 11_c_int
    !> How often a lock file that vanishes while it is being locked is tried again.
    integer, parameter :: most_attempts = 10
+   !> How the line that names a holder begins.
+   character(len=*), parameter :: holder_word = 'process '
    !> Longest line that names a holder.
    integer, parameter :: holder_length = 256
 
@@ -123,6 +125,13 @@ contains
             end if
             return
          end if
+         holder = line_of(path)
+         if (len(holder) > 0 .and. index(holder, holder_word) /= 1) then
+            status = c_fclose(lock%stream)
+            lock%stream = c_null_ptr
+            call fatal_error(error, "'"//path//"' is needed for the lock, but holds something else; remove it", exit_mismatch)
+            return
+         end if
          call write_holder(lock%stream, self, status)
          holder = line_of(path)
          if (status == 0 .and. holder == self) then
@@ -179,7 +188,7 @@ contains
       character(kind=c_char) :: name(holder_length/2)
       integer :: i
 
-      text = 'process '//to_text(c_getpid())
+      text = holder_word//to_text(c_getpid())
       if (c_gethostname(name, int(size(name) - 1, c_size_t)) /= 0) return
       name(size(name)) = achar(0)
       text = text//' on '

@@ -1,15 +1,63 @@
 !> The few system calls on files that Fortran lacks, with failures as `error_type`.
 module spurflex_external_posix
-   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_null_char, c_ptr, c_associated, c_size_t
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_int, c_int64_t, c_null_char, c_ptr, c_size_t
+   use spurflex_base_kinds, only: i8
    use spurflex_base_error, only: error_type, fatal_error
    implicit none
    private
 
-   public :: rename_file, remove_file, sync_file
+   public :: rename_file, remove_file, sync_file, make_folder, check_writable, check_room
    public :: c_string, errno, failure_reason
    public :: c_fopen, c_fclose, c_fileno
 
+   !> Read and write for everybody whom the mask of the process allows to.
+   integer(c_int), parameter :: everybody = 511_c_int
+   !> No room, on the disk or within a quota, or a file larger than is allowed (`ENOSPC`, `EDQUOT`, `EFBIG`).
+   integer(c_int), parameter :: errors_of_room(3) = [28_c_int, 122_c_int, 27_c_int]
+
    interface
+      !> Make a folder.
+      function c_mkdir(path, mode) bind(c, name='mkdir') result(status)
+         import :: c_char, c_int
+         !> Null-terminated path.
+         character(kind=c_char), intent(in) :: path(*)
+         !> Who may use it.
+         integer(c_int), value :: mode
+         !> 0, or -1 on failure.
+         integer(c_int) :: status
+      end function c_mkdir
+
+      !> Make and open a file of a new name.
+      function c_mkstemp(path) bind(c, name='mkstemp') result(descriptor)
+         import :: c_char, c_int
+         !> Null-terminated path that ends in six X, which become the new name.
+         character(kind=c_char), intent(inout) :: path(*)
+         !> Open file descriptor, or -1 on failure.
+         integer(c_int) :: descriptor
+      end function c_mkstemp
+
+      !> Close a file descriptor.
+      function c_close(descriptor) bind(c, name='close') result(status)
+         import :: c_int
+         !> Open file descriptor.
+         integer(c_int), value :: descriptor
+         !> 0, or -1 on failure.
+         integer(c_int) :: status
+      end function c_close
+
+      !> Take room on the disk for an open file.
+      function c_fallocate(descriptor, mode, offset, bytes) bind(c, name='fallocate') result(status)
+         import :: c_int, c_int64_t
+         !> Open file descriptor.
+         integer(c_int), value :: descriptor
+         !> 0: the file grows.
+         integer(c_int), value :: mode
+         !> Where the room begins, and how much it is.
+         integer(c_int64_t), value :: offset, bytes
+         !> 0, or -1 on failure.
+         integer(c_int) :: status
+      end function c_fallocate
+
       !> Rename a file; replaces `new` in one step.
       function c_rename(old, new) bind(c, name='rename') result(status)
          import :: c_char, c_int
@@ -143,6 +191,62 @@ contains
       end if
       call fatal_error(error, "cannot bring '"//path//"' to the disk: "//failure_reason(reason))
    end subroutine sync_file
+
+   !> Make a folder, if that can be done.
+   subroutine make_folder(path)
+      !> Path of the folder.
+      character(len=*), intent(in) :: path
+
+      integer(c_int) :: status
+
+      if (len(path) > 0) status = c_mkdir(c_string(path), everybody)
+   end subroutine make_folder
+
+   !> Whether a file can be opened for writing.
+   subroutine check_writable(path, error)
+      !> Path of the file, which exists.
+      character(len=*), intent(in) :: path
+      !> Set if it cannot.
+      type(error_type), allocatable, intent(out) :: error
+
+      type(c_ptr) :: stream
+      integer(c_int) :: status
+
+      stream = c_fopen(c_string(path), c_string('r+'))
+      if (c_associated(stream)) then
+         status = c_fclose(stream)
+      else
+         call fatal_error(error, "cannot write to '"//path//"': "//failure_reason(errno()))
+      end if
+   end subroutine check_writable
+
+   !> Whether there is room for a new file, by taking the room and giving it back. Where the system cannot tell, there is.
+   subroutine check_room(path, bytes, error)
+      !> Path of the new file; another name beside it is in use for a moment.
+      character(len=*), intent(in) :: path
+      !> Room that is needed [bytes].
+      integer(i8), intent(in) :: bytes
+      !> Set if there is no room.
+      type(error_type), allocatable, intent(out) :: error
+
+      character(len=*), parameter :: ending = '.XXXXXX'
+      character(kind=c_char) :: name(len(path) + len(ending) + 1)
+      integer(c_int) :: descriptor, status, reason
+
+      if (bytes <= 0_i8) return
+      name = c_string(path//ending)
+      descriptor = c_mkstemp(name)
+      if (descriptor < 0) then
+         call fatal_error(error, failure_reason(errno()))
+         return
+      end if
+      ! Without its name the file goes with its descriptor, however the program ends.
+      status = c_unlink(name)
+      reason = 0_c_int
+      if (c_fallocate(descriptor, 0_c_int, 0_c_int64_t, int(bytes, c_int64_t)) /= 0) reason = errno()
+      status = c_close(descriptor)
+      if (any(reason == errors_of_room)) call fatal_error(error, failure_reason(reason))
+   end subroutine check_room
 
    !> A Fortran string as C takes it.
    pure function c_string(text) result(characters)

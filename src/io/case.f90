@@ -2,6 +2,7 @@
 module spurflex_io_case
    use spurflex_base_kinds, only: wp
    use spurflex_integrate_options, only: solver_options
+   use spurflex_measure_record, only: record_request
    use spurflex_model_parameters, only: gear_pair, gearbox, load_type
    implicit none
    private
@@ -20,6 +21,8 @@ module spurflex_io_case
       integer :: speed_count = 1
       !> First and last support stiffness [N/m].
       real(wp) :: stiffness_first = 0.0_wp, stiffness_last = 0.0_wp
+      !> Time within which a run is to end [s], 0 for none. It concerns one run only.
+      real(wp) :: wall_clock_limit = 0.0_wp
       !> Number of support stiffnesses, evenly spaced in their logarithm; 0 without a flexible support.
       integer :: stiffness_count = 0
    end type sweep_spec
@@ -30,6 +33,8 @@ module spurflex_io_case
       character(len=:), allocatable :: file
       !> Products asked for beside the map, shape (products), e.g. 'history'.
       character(len=16), allocatable :: products(:)
+      !> What is recorded of each point.
+      type(record_request) :: record
    end type output_spec
 
    !> Everything that one deck says.
@@ -48,7 +53,8 @@ module spurflex_io_case
       type(solver_options) :: solver
       !> Output.
       type(output_spec) :: output
-      !> The deck with every default filled in, as namelist text with newlines; it reads back to the same case.
+      !> The deck with every default filled in, as namelist text with newlines; it reads back to the same case,
+      !> but for what concerns one run only.
       character(len=:), allocatable :: resolved
    end type case_type
 

@@ -6,6 +6,7 @@ module spurflex_io_checks
    use spurflex_model_parameters, only: mesh_excitation
    use spurflex_io_convert, only: allowed_text
    use spurflex_io_faults, only: fault_list, excerpt
+   use spurflex_io_record_checks, only: check_quantities, check_records
    use spurflex_io_schema, only: need_always, need_flexible, need_never
    use spurflex_io_values, only: deck_values
    implicit none
@@ -36,6 +37,10 @@ contains
       call check_points(table, faults)
       call check_solver(table, faults)
       call check_output(table, deck, faults)
+      call check_repeated(table, 'products', faults)
+      call check_repeated(table, 'quantities', faults)
+      call check_quantities(table, faults)
+      call check_records(table, faults)
    end subroutine check_values
 
    !> Whether a flexible support is asked for.
@@ -214,7 +219,7 @@ contains
       end if
    end subroutine check_solver
 
-   !> The result file can be written and is not the deck; no product is asked for twice.
+   !> The result file can be written and is not the deck.
    subroutine check_output(table, deck, faults)
       !> The values.
       type(deck_values), intent(in) :: table
@@ -224,7 +229,6 @@ contains
       type(fault_list), intent(inout) :: faults
 
       character(len=:), allocatable :: file
-      integer :: i, j
 
       file = table%text_of('output', 'file')
       if (table%known('output', ['file'])) then
@@ -239,17 +243,30 @@ contains
             call note(table, 'output', 'file', ''''//excerpt(file)//''' would overwrite the deck', faults)
          end if
       end if
-      if (.not. table%known('output', ['products'])) return
-      associate (products => table%values(table%at('output', 'products'))%texts)
-         do i = 2, size(products)
+   end subroutine check_output
+
+   !> No word of a list stands there twice.
+   subroutine check_repeated(table, key, faults)
+      !> The values.
+      type(deck_values), intent(in) :: table
+      !> A key of the output.
+      character(len=*), intent(in) :: key
+      !> Faults.
+      type(fault_list), intent(inout) :: faults
+
+      integer :: i, j
+
+      if (.not. table%known('output', [key])) return
+      associate (words => table%values(table%at('output', key))%texts)
+         do i = 2, size(words)
             do j = 1, i - 1
-               if (products(i)%text /= products(j)%text) cycle
-               call note(table, 'output', 'products', ''''//products(i)%text//''' is repeated', faults)
+               if (words(i)%text /= words(j)%text) cycle
+               call note(table, 'output', key, ''''//words(i)%text//''' is repeated', faults)
                return
             end do
          end do
       end associate
-   end subroutine check_output
+   end subroutine check_repeated
 
    !> A path behind its last slash.
    pure function last_part(path) result(part)

@@ -1,6 +1,7 @@
 !> The command line.
 module spurflex_io_command_line
    use spurflex_base_error, only: error_type, fatal_error, exit_deck
+   use spurflex_io_faults, only: excerpt
    implicit none
    private
 
@@ -68,10 +69,10 @@ contains
             command%fresh = .true.
          case default
             if (index(argument, '-') == 1) then
-               call fatal_error(error, "unknown option '"//argument//"'"//new_line('a')//usage, exit_deck)
+               call fatal_error(error, "unknown option '"//excerpt(argument)//"'"//new_line('a')//usage, exit_deck)
                return
             else if (allocated(command%deck)) then
-               call fatal_error(error, "more than one deck: '"//command%deck//"' and '"//argument//"'", exit_deck)
+               call fatal_error(error, "more than one deck: '"//excerpt(command%deck)//"' and '"//excerpt(argument)//"'", exit_deck)
                return
             end if
             command%deck = argument

@@ -3,7 +3,7 @@ module spurflex_io_convert
    use spurflex_base_kinds, only: wp, i8
    use spurflex_base_text, only: to_text
    use spurflex_io_entry, only: entry_type, value_type
-   use spurflex_io_faults, only: fault_list, excerpt, is_control, is_utf8
+   use spurflex_io_faults, only: fault_list, excerpt, has_control, is_utf8
    use spurflex_io_number, only: read_real, read_integer, numeric_prefix
    use spurflex_io_schema, only: key_spec, words_of, in_range, range_text, kind_integer, kind_real, kind_text, &
       kind_word, most_characters, word_length
@@ -182,15 +182,13 @@ contains
       !> The fault; empty if there is none.
       character(len=:), allocatable :: reason
 
-      integer :: i
-
       reason = ''
       if (spec%kind == kind_word) then
          if (len(text) > 0 .and. len_trim(text) == len(text) .and. any(words_of(spec) == text)) return
          reason = 'unknown word'//did_you_mean(text, words_of(spec))//'; allowed is '//allowed_text(spec)
       else if (len(text) > most_characters) then
          reason = to_text(len(text))//' characters, but at most '//to_text(most_characters)//' are allowed'
-      else if (any([(is_control(text(i:i)), i=1, len(text))])) then
+      else if (has_control(text)) then
          reason = 'a tab or another control character in the text'
       else if (.not. is_utf8(text)) then
          reason = 'the text is not UTF-8'

@@ -6,10 +6,11 @@ module spurflex_io_deck
    use spurflex_integrate_options, only: start_rest, start_static, start_up, start_down, integrator_newmark, integrator_collocation
    use spurflex_io_case, only: case_type
    use spurflex_io_checks, only: check_values, uses_flexible
-   use spurflex_io_faults, only: fault_list, excerpt, is_control
+   use spurflex_io_faults, only: fault_list, excerpt, printable
    use spurflex_io_namelist, only: namelist_type, parse_namelist
    use spurflex_io_resolved, only: resolved_deck
    use spurflex_io_values, only: deck_values, collect_values
+   use spurflex_measure_record, only: observable_of
    implicit none
    private
 
@@ -18,6 +19,7 @@ module spurflex_io_deck
    !> Largest deck [bytes].
    integer, parameter :: most_bytes = 1048576
 
+   real(wp), parameter :: seconds_per_minute = 60.0_wp
    !> One degree [rad].
    real(wp), parameter :: degree = pi/180.0_wp
 
@@ -37,8 +39,9 @@ contains
       integer :: unit, stat, bytes
       logical :: exists
 
+      ! Fortran drops blanks behind a name and would open another file.
       inquire (file=file, exist=exists)
-      if (len_trim(file) == 0 .or. .not. exists) then
+      if (len(file) == 0 .or. len_trim(file) < len(file) .or. .not. exists) then
          call fatal_error(error, excerpt(file)//': no such deck', exit_deck)
          return
       end if
@@ -151,15 +154,13 @@ contains
       character(len=:), allocatable :: file
 
       integer, parameter :: longest = 200
-      integer :: dot, i
+      integer :: dot
 
       file = trim(adjustl(name(index(name, '/', back=.true.) + 1:)))
       dot = index(file, '.', back=.true.)
       if (dot > 0) file = trim(file(:dot - 1))
-      do i = 1, len(file)
-         if (is_control(file(i:i))) file(i:i) = '_'
-      end do
-      file = file(:min(len(file), longest))
+      ! What is cut may end in the middle of a character.
+      file = trim(printable(file(:min(len(file), longest)), '_'))
       if (len(file) == 0) file = 'spurflex'
       file = file//'.h5'
    end function default_file
@@ -182,6 +183,7 @@ contains
       case%sweep%speed_first = table%real_of('sweep', 'speed_first')
       case%sweep%speed_last = table%real_of('sweep', 'speed_last')
       case%sweep%speed_count = table%integer_of('sweep', 'speed_count')
+      case%sweep%wall_clock_limit = seconds_per_minute*table%real_of('sweep', 'wall_clock_limit')
       if (case%sweep%flexible) call fill_flexible(table, case)
       select case (table%text_of('sweep', 'start'))
       case ('rest')
@@ -212,7 +214,30 @@ contains
             case%output%products(k) = products(i)%text
          end do
       end associate
+      call fill_record(table, case)
    end subroutine fill_case
+
+   !> Fill what is recorded of each point.
+   subroutine fill_record(table, case)
+      !> The values; without faults.
+      type(deck_values), intent(in) :: table
+      !> The case, its products known.
+      type(case_type), intent(inout) :: case
+
+      integer :: i
+
+      associate (record => case%output%record, names => table%values(table%at('output', 'quantities'))%texts)
+         record%spectrum = any(case%output%products == 'spectrum')
+         record%section = any(case%output%products == 'poincare')
+         record%history = any(case%output%products == 'history')
+         record%quantities = [(observable_of(names(i)%text), i=1, size(names))]
+         record%highest_order = table%real_of('output', 'highest_order')
+         record%spectrum_periods = table%integer_of('output', 'spectrum_periods')
+         record%sections = table%integer_of('output', 'sections')
+         record%history_periods = table%integer_of('output', 'history_periods')
+         record%history_samples = table%integer_of('output', 'history_samples')
+      end associate
+   end subroutine fill_record
 
    !> Fill gear pair, bearings and mesh.
    subroutine fill_gears(table, case)

@@ -5,7 +5,7 @@ module spurflex_io_faults
    implicit none
    private
 
-   public :: fault_list, excerpt, is_control, is_utf8
+   public :: fault_list, excerpt, printable, has_control, is_utf8
 
    !> Most faults kept; further ones are only counted, so that a hostile deck cannot fill the memory.
    integer, parameter :: most_kept = 1000
@@ -136,24 +136,77 @@ contains
       character(len=:), allocatable :: shown
 
       integer, parameter :: most_characters = 200
-      integer :: i, bytes
+      character(len=:), allocatable :: character
+      integer :: i
 
       shown = ''
       i = 1
       do while (i <= len(text))
-         bytes = utf8_bytes(text(i:))
-         if (len(shown) + bytes > most_characters) then
+         call take_character(text, '?', i, character)
+         if (len(shown) + len(character) > most_characters) then
             shown = shown//'...'
             return
          end if
-         if (bytes == 0 .or. is_control(text(i:i))) then
-            shown = shown//'?'
-         else
-            shown = shown//text(i:i + bytes - 1)
-         end if
-         i = i + max(bytes, 1)
+         shown = shown//character
       end do
    end function excerpt
+
+   !> A text without what cannot be printed.
+   pure function printable(text, mark) result(clean)
+      !> Any text.
+      character(len=*), intent(in) :: text
+      !> What takes the place of control characters and of what is not UTF-8.
+      character(len=1), intent(in) :: mark
+      !> The text, in UTF-8.
+      character(len=:), allocatable :: clean
+
+      character(len=:), allocatable :: character
+      integer :: i
+
+      clean = ''
+      i = 1
+      do while (i <= len(text))
+         call take_character(text, mark, i, character)
+         clean = clean//character
+      end do
+   end function printable
+
+   !> Whether a text holds control characters.
+   pure function has_control(text) result(has)
+      !> The text.
+      character(len=*), intent(in) :: text
+      !> It does.
+      logical :: has
+
+      integer :: i
+
+      has = .false.
+      do i = 1, len(text)
+         has = has .or. begins_with_control(text(i:))
+      end do
+   end function has_control
+
+   !> Take the next character of a text.
+   pure subroutine take_character(text, mark, i, character)
+      !> The text.
+      character(len=*), intent(in) :: text
+      !> What takes the place of control characters and of what is not UTF-8.
+      character(len=1), intent(in) :: mark
+      !> Where the character begins; on return, where the next one does.
+      integer, intent(inout) :: i
+      !> The character.
+      character(len=:), allocatable, intent(out) :: character
+
+      integer :: bytes
+
+      bytes = utf8_bytes(text(i:))
+      if (bytes == 0 .or. begins_with_control(text(i:))) then
+         character = mark
+      else
+         character = text(i:i + bytes - 1)
+      end if
+      i = i + max(bytes, 1)
+   end subroutine take_character
 
    !> Whether a text is UTF-8; plain ASCII is.
    pure function is_utf8(text) result(valid)
@@ -209,16 +262,18 @@ contains
       end do
    end function utf8_bytes
 
-   !> Whether a byte is an ASCII control character.
-   elemental function is_control(byte) result(control)
-      !> The byte.
-      character(len=1), intent(in) :: byte
-      !> It is one of codes 0 to 31 and 127.
+   !> Whether a text begins with a control character: ASCII's, or those of Unicode from 128 to 159, which terminals obey too.
+   pure function begins_with_control(text) result(control)
+      !> The text; not empty.
+      character(len=*), intent(in) :: text
+      !> It does.
       logical :: control
 
       integer, parameter :: first_printable = 32, delete = 127
 
-      control = iachar(byte) < first_printable .or. iachar(byte) == delete
-   end function is_control
+      control = iachar(text(1:1)) < first_printable .or. iachar(text(1:1)) == delete
+      if (control .or. len(text) < 2) return
+      control = iachar(text(1:1)) == int(z'c2') .and. iachar(text(2:2)) >= int(z'80') .and. iachar(text(2:2)) < int(z'a0')
+   end function begins_with_control
 
 end module spurflex_io_faults

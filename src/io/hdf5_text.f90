@@ -1,23 +1,26 @@
 !> Texts and attributes in HDF5 files.
 module spurflex_io_hdf5_text
    use, intrinsic :: iso_c_binding, only: c_char, c_loc, c_ptr
-   use hdf5, only: H5P_DATASET_CREATE_F, H5S_SCALAR_F, H5T_C_S1, H5T_CSET_UTF8_F, H5T_NATIVE_INTEGER, H5T_STD_I32LE, &
+   use hdf5, only: H5P_DATASET_CREATE_F, H5S_SCALAR_F, H5T_C_S1, H5T_CSET_UTF8_F, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, &
+      H5T_NATIVE_INTEGER, H5T_STD_I32LE, &
       H5T_STRING_F, H5T_STR_NULLPAD_F, h5aclose_f, h5acreate_f, h5awrite_f, h5dclose_f, h5dcreate_f, h5dget_space_f, &
       h5dget_type_f, h5dopen_f, h5dread_f, h5dwrite_f, h5pclose_f, h5pcreate_f, h5pset_obj_track_times_f, &
       h5sclose_f, h5screate_f, h5screate_simple_f, h5sget_simple_extent_npoints_f, h5tclose_f, h5tcopy_f, &
       h5tget_class_f, h5tget_size_f, h5tis_variable_str_f, h5tset_cset_f, h5tset_size_f, h5tset_strpad_f, hid_t, &
       hsize_t, size_t
    use spurflex_base_error, only: error_type
+   use spurflex_base_kinds, only: wp
    use spurflex_io_hdf5, only: check
    implicit none
    private
 
    public :: write_attribute, write_text, read_text
 
-   !> Give an object an attribute: a text, or a list of integers.
+   !> Give an object an attribute: a text, a real, or a list of integers.
    interface write_attribute
       module procedure :: write_text_attribute
       module procedure :: write_integers_attribute
+      module procedure :: write_real_attribute
    end interface write_attribute
 
 contains
@@ -77,6 +80,31 @@ contains
       call h5sclose_f(space, ierr(3))
       call check(minval(ierr), "write the attribute '"//name//"'", error)
    end subroutine write_integers_attribute
+
+   !> Give an object a real as attribute.
+   subroutine write_real_attribute(object, name, value, error)
+      !> File, group or dataset.
+      integer(hid_t), intent(in) :: object
+      !> Name of the attribute.
+      character(len=*), intent(in) :: name
+      !> The real.
+      real(wp), intent(in) :: value
+      !> Set if it cannot be done.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer(hid_t) :: space, attribute
+      integer(hsize_t), parameter :: one(1) = 1_hsize_t
+      integer :: ierr(3)
+
+      call h5screate_f(H5S_SCALAR_F, space, ierr(1))
+      call h5acreate_f(object, name, H5T_IEEE_F64LE, space, attribute, ierr(2))
+      call check(minval(ierr(:2)), "make the attribute '"//name//"'", error)
+      if (allocated(error)) return
+      call h5awrite_f(attribute, H5T_NATIVE_DOUBLE, value, one, ierr(1))
+      call h5aclose_f(attribute, ierr(2))
+      call h5sclose_f(space, ierr(3))
+      call check(minval(ierr), "write the attribute '"//name//"'", error)
+   end subroutine write_real_attribute
 
    !> Write a text as a dataset of its own.
    subroutine write_text(parent, name, text, error)

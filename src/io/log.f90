@@ -1,6 +1,7 @@
 !> What the program says while it runs: one logger, lines to standard output, from rank 0 only.
 module spurflex_io_log
    use, intrinsic :: iso_fortran_env, only: output_unit, error_unit
+   use spurflex_base_clock, only: steady_seconds
    use spurflex_base_kinds, only: wp, i8
    use spurflex_base_text, only: to_text, fixed_text
    implicit none
@@ -10,16 +11,20 @@ module spurflex_io_log
 
    !> Seconds between progress lines.
    real(wp), parameter :: progress_interval = 5.0_wp
+   !> A phase shorter than this says nothing of its estimated time [s].
+   real(wp), parameter :: shortest_judged = 1.0_wp
 
    !> Where lines go and when the next progress line is due.
    type :: logger
       private
       !> This logger writes.
       logical :: active = .false.
-      !> Tick of the clock at the start, and ticks per second.
-      integer(i8) :: start = 0_i8, rate = 1_i8
+      !> Moment of the start [s].
+      real(wp) :: start = 0.0_wp
       !> Elapsed seconds at the last progress line and at the start of the phase.
       real(wp) :: last = 0.0_wp, phase_start = 0.0_wp
+      !> When half of the points of the phase were done, and the time that then seemed to be left [s]; negative before.
+      real(wp) :: half = -1.0_wp, estimate = -1.0_wp
    contains
       !> Say something.
       procedure :: say
@@ -29,6 +34,8 @@ module spurflex_io_log
       procedure :: begin
       !> Say how far the phase is, if it is time to.
       procedure :: progress
+      !> End a phase of work.
+      procedure :: finish
       !> Seconds since the logger was made.
       procedure :: elapsed
    end type logger
@@ -43,7 +50,7 @@ contains
       type(logger) :: self
 
       self%active = active
-      call system_clock(self%start, self%rate)
+      self%start = steady_seconds()
    end function new_logger
 
    !> Seconds since the logger was made.
@@ -53,10 +60,7 @@ contains
       !> Seconds.
       real(wp) :: seconds
 
-      integer(i8) :: now
-
-      call system_clock(now)
-      seconds = real(now - self%start, wp)/real(self%rate, wp)
+      seconds = steady_seconds() - self%start
    end function elapsed
 
    !> Say something.
@@ -78,7 +82,7 @@ contains
       !> One or more lines.
       character(len=*), intent(in) :: text
 
-      if (self%rate == 0_i8) return
+      if (self%start < 0.0_wp) return
       write (error_unit, '(a)') text
       flush (error_unit)
    end subroutine complain
@@ -92,6 +96,7 @@ contains
 
       self%phase_start = self%elapsed()
       self%last = self%phase_start
+      self%half = -1.0_wp
       call self%say(text)
    end subroutine begin
 
@@ -109,14 +114,32 @@ contains
 
       if (.not. self%active) return
       now = self%elapsed()
+      spent = now - self%phase_start
+      if (self%half < 0.0_wp .and. 2_i8*done >= total) then
+         self%half = now
+         self%estimate = spent*real(total - done, wp)/real(max(done, 1_i8), wp)
+      end if
       if (now - self%last < progress_interval) return
       self%last = now
-      spent = now - self%phase_start
       left = 'unknown'
       if (done > 0_i8) left = fixed_text(spent*real(total - done, wp)/real(done, wp), 0)//' s'
       call self%say('  '//to_text(done)//' of '//to_text(total)//' points ('// &
                     fixed_text(100.0_wp*real(done, wp)/real(max(total, 1_i8), wp), 1)//' %), '//remark// &
                     '; elapsed '//fixed_text(now, 0)//' s, remaining about '//left)
    end subroutine progress
+
+   !> End a phase of work that was not stopped: say how wrong the estimate of its time was.
+   subroutine finish(self)
+      !> Logger.
+      class(logger), intent(in) :: self
+
+      real(wp) :: now, taken
+
+      now = self%elapsed()
+      taken = now - self%half
+      if (self%half < 0.0_wp .or. now - self%phase_start < shortest_judged .or. taken <= 0.0_wp) return
+      call self%say('remaining time as estimated at half of the points: '//fixed_text(self%estimate, 1)//' s; it took ' &
+                    //fixed_text(taken, 1)//' s (error '//to_text(nint(100.0_wp*(self%estimate - taken)/taken))//' %)')
+   end subroutine finish
 
 end module spurflex_io_log

@@ -46,6 +46,9 @@ contains
       !> Why it is refused; empty if it is not.
       character(len=:), allocatable, intent(out) :: reason
 
+      ! Digits that are rounded up may reach what would be refused when it is printed and read again.
+      real(wp), parameter :: largest = 10.0_wp**(largest_exponent + 1)
+      character(len=*), parameter :: too_large = 'the number is too large for double precision'
       type(number_parts) :: parts
       character(len=most_characters + 8) :: literal
       integer :: stat
@@ -60,13 +63,18 @@ contains
       else if (parts%zero) then
          if (text(1:1) == '-') number = sign(0.0_wp, -1.0_wp)
       else if (parts%magnitude > largest_exponent) then
-         reason = 'the number is too large for double precision'
+         reason = too_large
       else if (parts%magnitude < smallest_exponent) then
          reason = 'the number is too small for double precision; write 0.0'
       else
          literal = text(:parts%mantissa)//'e'//to_text(parts%exponent)
          read (literal, *, iostat=stat) number
-         if (stat /= 0) reason = 'not a number'
+         if (stat /= 0) then
+            reason = 'not a number'
+         else if (abs(number) >= largest) then
+            number = 0.0_wp
+            reason = too_large
+         end if
       end if
    end subroutine read_real
 

@@ -24,7 +24,7 @@ contains
       logical :: printed(size(table%keys))
       integer :: i, j
 
-      printed = table%values%valid
+      printed = table%values%valid .and. .not. table%keys%of_run
       if (.not. uses_flexible(table)) printed = printed .and. table%keys%need /= need_flexible
       text = ''
       do i = 1, size(table%groups)

@@ -5,23 +5,27 @@ module spurflex_io_results
       h5pset_fapl_mpio_f, hid_t
    use mpi_f08, only: MPI_Comm, MPI_COMM_NULL, MPI_INFO_NULL, mpi_comm_rank, operator(==)
    use spurflex_base_error, only: error_type, exit_mismatch, fatal_error
-   use spurflex_base_kinds, only: wp
+   use spurflex_base_kinds, only: i4, wp
+   use spurflex_base_text, only: to_text
    use spurflex_external_file_lock, only: acquire_lock, file_lock, release_lock
-   use spurflex_external_posix, only: rename_file, sync_file
    use spurflex_io_agreement, only: share_error
    use spurflex_io_case, only: case_type
    use spurflex_io_hdf5, only: check, start_hdf5
    use spurflex_io_provenance, only: provenance_type
    use spurflex_io_results_check, only: check_file
-   use spurflex_io_results_create, only: create_file
-   use spurflex_io_results_layout, only: flexible_variables, rigid_variables
-   use spurflex_io_results_set, only: close_set, open_set, read_points, read_states, variable_set, write_points
+   use spurflex_io_results_create, only: make_file
+   use spurflex_io_results_failures, only: failures_text
+   use spurflex_io_results_set, only: read_points, read_states, write_points
+   use spurflex_io_results_support, only: close_support, is_asked_for, open_support, support_set, &
+      write_support_records => write_records
+   use spurflex_io_results_verify, only: verify_support
+   use spurflex_measure_record, only: record_type
    use spurflex_measure_response, only: empty_response, nan, response, status_missing
    implicit none
    private
 
    public :: results_file, create_results, open_results, close_results
-   public :: read_status, read_rigid, write_rigid, write_flexible
+   public :: read_status, read_rigid, write_records, write_rigid, write_flexible, describe_damage, describe_failures
 
    !> A result file that all ranks of a communicator have open.
    type :: results_file
@@ -33,9 +37,9 @@ module spurflex_io_results
       !> Open file.
       integer(hid_t) :: file = -1_hid_t
       !> Variables of the rigid support, on (speed); empty if it is not asked for.
-      type(variable_set) :: rigid
+      type(support_set) :: rigid
       !> Variables of the flexible support, on (speed, stiffness); empty if it is not asked for.
-      type(variable_set) :: flexible
+      type(support_set) :: flexible
    end type results_file
 
 contains
@@ -69,7 +73,8 @@ contains
       call open_shared(results, case, error)
    end subroutine create_results
 
-   !> Open an existing result file on every rank to continue it. All ranks call this together.
+   !> Open an existing result file on every rank to continue it; points whose checksum does not fit become missing. All ranks
+   !> call this together.
    subroutine open_results(results, case, comm, error)
       !> The open file.
       type(results_file), intent(out) :: results
@@ -80,6 +85,7 @@ contains
       !> Set on every rank, with `exit_mismatch` and what differs if the file belongs to another deck or version.
       type(error_type), allocatable, intent(out) :: error
 
+      type(error_type), allocatable :: next
       integer :: rank
 
       call start_hdf5(error)
@@ -92,6 +98,10 @@ contains
          if (.not. allocated(error)) call check_file(case%output%file, case, error)
       end if
       call open_shared(results, case, error)
+      if (.not. allocated(error)) call verify_support(results%rigid, comm, error)
+      if (.not. allocated(error)) call verify_support(results%flexible, comm, error)
+      if (.not. allocated(error) .or. results%comm == MPI_COMM_NULL) return
+      call close_results(results, next)
    end subroutine open_results
 
    !> Close the file and remove its lock; does nothing if it is not open. All ranks call this together.
@@ -105,8 +115,8 @@ contains
       integer :: ierr
 
       if (results%comm == MPI_COMM_NULL) return
-      call close_set(results%rigid, error)
-      call close_set(results%flexible, next)
+      call close_support(results%rigid, error)
+      call close_support(results%flexible, next)
       call keep_first(error, next)
       if (results%file >= 0) then
          call h5fclose_f(results%file, ierr)
@@ -136,18 +146,20 @@ contains
 
       rigid_status = status_missing
       flexible_status = status_missing
-      if (size(results%rigid%variables) > 0) then
-         call require(all(shape(rigid_status) == results%rigid%extents), error)
+      if (is_asked_for(results%rigid)) then
+         call require(all(shape(rigid_status) == results%rigid%points%extents), error)
          if (allocated(error)) return
-         call read_states(results%rigid, rigid_states, error)
+         call read_states(results%rigid%points, rigid_states, error)
          if (allocated(error)) return
+         if (size(results%rigid%damaged) > 0) where (results%rigid%damaged) rigid_states = status_missing
          rigid_status = rigid_states
       end if
-      if (size(results%flexible%variables) > 0) then
-         call require(all(shape(flexible_status) == results%flexible%extents), error)
+      if (is_asked_for(results%flexible)) then
+         call require(all(shape(flexible_status) == results%flexible%points%extents), error)
          if (allocated(error)) return
-         call read_states(results%flexible, flexible_states, error)
+         call read_states(results%flexible%points, flexible_states, error)
          if (allocated(error)) return
+         if (size(results%flexible%damaged) > 0) where (results%flexible%damaged) flexible_states = status_missing
          flexible_status = reshape(flexible_states, shape(flexible_status))
       end if
    end subroutine read_status
@@ -166,14 +178,40 @@ contains
       do i = 1, size(responses)
          responses(i) = empty_response()
       end do
-      if (size(results%rigid%variables) == 0) return
-      call require(all(shape(responses) == results%rigid%extents), error)
+      if (.not. is_asked_for(results%rigid)) return
+      call require(all(shape(responses) == results%rigid%points%extents), error)
       if (allocated(error)) return
-      call read_points(results%rigid, responses, error)
+      call read_points(results%rigid%points, responses, error)
+      do i = 1, size(results%rigid%damaged)
+         if (results%rigid%damaged(i)) responses(i) = empty_response()
+      end do
    end subroutine read_rigid
 
+   !> Write what was recorded of points; their responses are to follow. Each rank writes for itself.
+   subroutine write_records(results, first_stiffness, stiffnesses, first_speed, records, checksums, error)
+      !> The open file.
+      type(results_file), intent(in) :: results
+      !> Index of the first support stiffness, 0 for the rigid support, and number of consecutive ones.
+      integer, intent(in) :: first_stiffness, stiffnesses
+      !> Index of the first speed, from 1.
+      integer, intent(in) :: first_speed
+      !> Records at consecutive speeds for one stiffness after the other, shape (points).
+      type(record_type), intent(in) :: records(:)
+      !> Their checksums, with which the responses are to be written, shape (points).
+      integer(i4), intent(out) :: checksums(:)
+      !> Set if they cannot be written.
+      type(error_type), allocatable, intent(out) :: error
+
+      if (first_stiffness == 0) then
+         call write_support_records(results%rigid, [first_speed], [size(records)], records, checksums, error)
+      else
+         call write_support_records(results%flexible, [first_speed, first_stiffness], &
+                                    [size(records)/stiffnesses, stiffnesses], records, checksums, error)
+      end if
+   end subroutine write_records
+
    !> Write responses on the rigid support. Each rank writes for itself.
-   subroutine write_rigid(results, first_speed, responses, error)
+   subroutine write_rigid(results, first_speed, responses, error, checksums)
       !> The open file.
       type(results_file), intent(in) :: results
       !> Index of the first speed, from 1.
@@ -182,17 +220,22 @@ contains
       type(response), intent(in) :: responses(:)
       !> Set if they cannot be written.
       type(error_type), allocatable, intent(out) :: error
+      !> Checksums of what was recorded of them, shape (points); nothing was if absent.
+      integer(i4), intent(in), optional :: checksums(:)
 
       real(wp) :: eta(3, size(responses))
+      integer(i4) :: known_checksums(size(responses))
 
       eta = nan()
-      call require(size(results%rigid%variables) > 0, error)
-      if (.not. allocated(error)) call write_points(results%rigid, [first_speed], [size(responses)], responses, &
-                                                    eta, error)
+      known_checksums = 0_i4
+      if (present(checksums)) known_checksums = checksums
+      call require(is_asked_for(results%rigid), error)
+      if (allocated(error)) return
+      call write_points(results%rigid%points, [first_speed], [size(responses)], responses, eta, known_checksums, error)
    end subroutine write_rigid
 
    !> Write responses on the flexible support. Each rank writes for itself.
-   subroutine write_flexible(results, first_stiffness, stiffnesses, first_speed, responses, eta, error)
+   subroutine write_flexible(results, first_stiffness, stiffnesses, first_speed, responses, eta, error, checksums)
       !> The open file.
       type(results_file), intent(in) :: results
       !> Index of the first support stiffness, from 1, and number of consecutive ones.
@@ -206,43 +249,61 @@ contains
       real(wp), intent(in), optional :: eta(:, :)
       !> Set if they cannot be written.
       type(error_type), allocatable, intent(out) :: error
+      !> Checksums of what was recorded of them, shape (points); nothing was if absent.
+      integer(i4), intent(in), optional :: checksums(:)
 
       real(wp) :: known_eta(3, size(responses))
+      integer(i4) :: known_checksums(size(responses))
 
+      known_checksums = 0_i4
+      if (present(checksums)) known_checksums = checksums
       known_eta = nan()
       if (present(eta)) known_eta = eta
-      call require(size(results%flexible%variables) > 0, error)
+      call require(is_asked_for(results%flexible), error)
       if (allocated(error)) return
-      call write_points(results%flexible, [first_speed, first_stiffness], [size(responses)/stiffnesses, stiffnesses], responses, &
-                        known_eta, error)
+      call write_points(results%flexible%points, [first_speed, first_stiffness], [size(responses)/stiffnesses, stiffnesses], &
+                        responses, known_eta, known_checksums, error)
    end subroutine write_flexible
 
-   !> Make the file under another name, so that what has the final name is always whole.
-   subroutine make_file(path, case, provenance, replace, error)
-      !> Path of the file.
-      character(len=*), intent(in) :: path
+   !> How many points of a support did not fit their checksum when the file was opened.
+   pure function describe_damage(results, rigid) result(text)
+      !> The open file.
+      type(results_file), intent(in) :: results
+      !> The rigid support, not the flexible one.
+      logical, intent(in) :: rigid
+      !> One line; empty if all did.
+      character(len=:), allocatable :: text
+
+      integer :: damaged
+
+      if (rigid) then
+         damaged = count(results%rigid%damaged)
+      else
+         damaged = count(results%flexible%damaged)
+      end if
+      text = ''
+      if (damaged == 1) text = '1 point was damaged (checksum) and is computed again'
+      if (damaged > 1) text = to_text(damaged)//' points were damaged (checksum) and are computed again'
+   end function describe_damage
+
+   !> How many points of the file failed and why, the first ones by name. Rank 0 reads alone.
+   subroutine describe_failures(results, case, text)
+      !> The open file.
+      type(results_file), intent(in) :: results
       !> What is computed.
       type(case_type), intent(in) :: case
-      !> What computes it.
-      type(provenance_type), intent(in) :: provenance
-      !> Replace a file of that name.
-      logical, intent(in) :: replace
-      !> Set if the file exists or cannot be made.
-      type(error_type), allocatable, intent(out) :: error
+      !> One or more lines; empty if every point is settled, and on the other ranks.
+      character(len=:), allocatable, intent(out) :: text
 
-      logical :: exists
+      type(error_type), allocatable :: error
+      integer :: rank
 
-      inquire (file=path, exist=exists)
-      if (exists .and. .not. replace) then
-         call fatal_error(error, "the result file '"//path//"' exists already", exit_mismatch)
-         return
-      end if
-      call create_file(path//'.part', case, provenance, error)
-      if (allocated(error)) return
-      call sync_file(path//'.part', error)
-      if (allocated(error)) return
-      call rename_file(path//'.part', path, error)
-   end subroutine make_file
+      text = ''
+      call mpi_comm_rank(results%comm, rank)
+      if (rank /= 0) return
+      call failures_text(results%rigid, results%flexible, case%sweep, text, error)
+      if (allocated(error)) text = 'why points failed cannot be read: '//error%message
+   end subroutine describe_failures
 
    !> Open the file on every rank, unless rank 0 found that it should not be; then leave nothing open and no lock.
    subroutine open_shared(results, case, error)
@@ -257,7 +318,7 @@ contains
       integer(hid_t) :: access
       integer :: ierr(4)
 
-      associate (sweep => case%sweep, path => case%output%file)
+      associate (path => case%output%file)
       call share_error(results%comm, error)
       if (.not. allocated(error)) then
          call h5pcreate_f(H5P_FILE_ACCESS_F, access, ierr(1))
@@ -269,11 +330,8 @@ contains
          call share_error(results%comm, error)
       end if
       if (.not. allocated(error)) then
-         call open_set(results%rigid, results%file, rigid_variables(sweep, case%output%products), [sweep%speed_count], error)
-         if (.not. allocated(error)) then
-            call open_set(results%flexible, results%file, flexible_variables(sweep, case%output%products), &
-               [sweep%speed_count, sweep%stiffness_count], error)
-         end if
+         call open_support(results%rigid, results%file, case, .true., error)
+         if (.not. allocated(error)) call open_support(results%flexible, results%file, case, .false., error)
          if (allocated(error)) then
             error%code = exit_mismatch
             error%message = "the result file '"//path//"' is damaged: "//error%message

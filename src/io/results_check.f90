@@ -7,6 +7,7 @@ module spurflex_io_results_check
    use spurflex_io_deck_difference, only: deck_difference
    use spurflex_io_hdf5, only: check
    use spurflex_io_hdf5_text, only: read_text
+   use spurflex_io_results_check_axes, only: check_axes
    use spurflex_io_results_create, only: deck_name, provenance_group, version_name
    implicit none
    private
@@ -27,7 +28,7 @@ contains
       !> Set with `exit_mismatch` and what differs if the file does not belong to the case.
       type(error_type), allocatable, intent(out) :: error
 
-      type(error_type), allocatable :: read_error
+      type(error_type), allocatable :: read_error, axes_error
       character(len=:), allocatable :: deck, file_version
       integer(hid_t) :: file
       logical :: is_hdf5, exists
@@ -50,6 +51,7 @@ contains
          return
       end if
       call read_identity(file, deck, file_version, read_error)
+      call check_axes(file, case, axes_error)
       call h5fclose_f(file, ierr)
       if (allocated(read_error)) then
          call fatal_error(error, "'"//path//"' is not a result file of spurflex ("//read_error%message//').'//advice, &
@@ -60,6 +62,8 @@ contains
       else if (deck /= case%resolved .or. len(deck) /= len(case%resolved)) then
          call fatal_error(error, "the result file '"//path//"' was computed from another deck:" &
             //deck_difference(deck, case%resolved, 'file', 'deck')//advice, exit_mismatch)
+      else if (allocated(axes_error)) then
+         call fatal_error(error, "the result file '"//path//"' is damaged: "//axes_error%message//advice, exit_mismatch)
       end if
    end subroutine check_file
 

@@ -1,18 +1,20 @@
 !> Makes the result file, complete but for the numbers, in one process.
 module spurflex_io_results_create
-   use hdf5, only: H5F_ACC_TRUNC_F, H5F_SCOPE_GLOBAL_F, H5T_NATIVE_DOUBLE, h5dclose_f, h5dwrite_f, h5fclose_f, &
-      h5fcreate_f, h5fflush_f, h5gclose_f, h5gcreate_f, hid_t, hsize_t
-   use spurflex_base_error, only: error_type
+   use hdf5, only: H5F_ACC_TRUNC_F, H5F_SCOPE_GLOBAL_F, H5T_NATIVE_DOUBLE, h5dclose_f, h5dopen_f, h5dwrite_f, h5fclose_f, &
+      h5fcreate_f, h5fflush_f, h5gclose_f, h5gcreate_f, h5lcreate_hard_f, hid_t, hsize_t
+   use spurflex_base_error, only: error_type, exit_mismatch, fatal_error
+   use spurflex_base_kinds, only: wp
+   use spurflex_external_posix, only: rename_file, sync_file
    use spurflex_io_case, only: case_type
    use spurflex_io_hdf5, only: attach_scale, check, create_dataset, make_scale
    use spurflex_io_hdf5_text, only: write_attribute, write_text
    use spurflex_io_provenance, only: provenance_type
-   use spurflex_io_results_layout, only: axes_of, axis_type, flags_of, flexible_variables, real_value, &
-      rigid_variables, variable_type
+   use spurflex_io_record_layout, only: file_axes, file_variables, history_group, record_spectrum, window_text
+   use spurflex_io_results_layout, only: axis_type, flags_of, real_value, speed_axis, stiffness_axis, variable_type
    implicit none
    private
 
-   public :: create_file
+   public :: make_file
    public :: provenance_group, deck_name, version_name
 
    !> Group that says where the file comes from.
@@ -21,10 +23,39 @@ module spurflex_io_results_create
    character(len=*), parameter :: deck_name = 'resolved_deck'
    !> Text in it: the version of the program.
    character(len=*), parameter :: version_name = 'version'
+   !> Axes that every group shows.
+   character(len=*), parameter :: axes_of_grid(2) = [character(len=17) :: speed_axis, stiffness_axis]
    !> Metadata conventions that the attributes follow.
    character(len=*), parameter :: conventions = 'CF-1.10'
 
 contains
+
+   !> Make the file under another name, so that what has the final name is always whole.
+   subroutine make_file(path, case, provenance, replace, error)
+      !> Path of the file.
+      character(len=*), intent(in) :: path
+      !> What is computed.
+      type(case_type), intent(in) :: case
+      !> What computes it.
+      type(provenance_type), intent(in) :: provenance
+      !> Replace a file of that name.
+      logical, intent(in) :: replace
+      !> Set if the file exists or cannot be made.
+      type(error_type), allocatable, intent(out) :: error
+
+      logical :: exists
+
+      inquire (file=path, exist=exists)
+      if (exists .and. .not. replace) then
+         call fatal_error(error, "the result file '"//path//"' exists already", exit_mismatch)
+         return
+      end if
+      call create_file(path//'.part', case, provenance, error)
+      if (allocated(error)) return
+      call sync_file(path//'.part', error)
+      if (allocated(error)) return
+      call rename_file(path//'.part', path, error)
+   end subroutine make_file
 
    !> Make the file with every axis, variable and attribute, flush and close it.
    subroutine create_file(path, case, provenance, error)
@@ -79,23 +110,82 @@ contains
       call write_provenance(file, case%resolved, provenance, error)
       if (allocated(error)) return
 
-      axes = axes_of(case%sweep)
+      axes = file_axes(case)
+      if (any(axes%group /= '')) then
+         call create_group(file, history_group, error)
+         if (allocated(error)) return
+      end if
       allocate (scales(size(axes)))
       do i = 1, size(axes)
          call create_axis(file, axes(i), scales(i), error)
          if (allocated(error)) return
       end do
-      allocate (variables, source=[flexible_variables(case%sweep, case%output%products), &
-                                    rigid_variables(case%sweep, case%output%products)])
+      allocate (variables, source=file_variables(case))
       do i = 1, size(variables)
          call create_variable(file, variables(i), axes, scales, error)
          if (allocated(error)) return
+         if (variables(i)%record == record_spectrum) then
+            call describe_spectrum(file, trim(variables(i)%name), 1.0_wp/real(case%output%record%spectrum_periods, wp), error)
+            if (allocated(error)) return
+         end if
       end do
+      if (any(axes%group /= '')) then
+         ! The axes of the grid can be seen in the group too.
+         do i = 1, size(axes)
+            if (all(axes(i)%name /= axes_of_grid)) cycle
+            call h5lcreate_hard_f(file, trim(axes(i)%name), file, history_group//'/'//trim(axes(i)%name), ierr)
+            call check(ierr, "show the axis '"//trim(axes(i)%name)//"' in the group '"//history_group//"'", error)
+            if (allocated(error)) return
+         end do
+      end if
       do i = 1, size(scales)
          call h5dclose_f(scales(i), ierr)
          call check(ierr, "close the axis '"//trim(axes(i)%name)//"'", error)
       end do
    end subroutine fill_file
+
+   !> Make an empty group.
+   subroutine create_group(file, name, error)
+      !> Open file.
+      integer(hid_t), intent(in) :: file
+      !> Name of the group.
+      character(len=*), intent(in) :: name
+      !> Set if it cannot be made.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer(hid_t) :: group
+      integer :: ierr(2)
+
+      call h5gcreate_f(file, name, group, ierr(1))
+      call check(ierr(1), "make the group '"//name//"'", error)
+      if (allocated(error)) return
+      call h5gclose_f(group, ierr(2))
+      call check(ierr(2), "close the group '"//name//"'", error)
+   end subroutine create_group
+
+   !> Say how a spectrum was made.
+   subroutine describe_spectrum(file, name, resolution, error)
+      !> Open file.
+      integer(hid_t), intent(in) :: file
+      !> Name of the variable.
+      character(len=*), intent(in) :: name
+      !> Distance of its lines, in multiples of the mesh frequency.
+      real(wp), intent(in) :: resolution
+      !> Set if it cannot be written.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer(hid_t) :: dataset
+      integer :: ierr
+
+      call h5dopen_f(file, name, dataset, ierr)
+      call check(ierr, "open the variable '"//name//"'", error)
+      if (allocated(error)) return
+      call write_attribute(dataset, 'resolution', resolution, error)
+      if (.not. allocated(error)) call write_attribute(dataset, 'window', window_text, error)
+      if (allocated(error)) return
+      call h5dclose_f(dataset, ierr)
+      call check(ierr, "close the variable '"//name//"'", error)
+   end subroutine describe_spectrum
 
    !> Write the group that says where the file comes from.
    subroutine write_provenance(file, resolved, provenance, error)
@@ -140,7 +230,7 @@ contains
       integer(hsize_t) :: extents(1)
       integer :: ierr
 
-      call create_dataset(file, trim(axis%name), shape(axis%values), .true., scale, error)
+      call create_dataset(file, trim(axis%group)//trim(axis%name), shape(axis%values), .true., scale, error)
       if (allocated(error)) return
       extents = size(axis%values, kind=hsize_t)
       call h5dwrite_f(scale, H5T_NATIVE_DOUBLE, axis%values, extents, ierr)

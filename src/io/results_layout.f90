@@ -1,14 +1,17 @@
 !> The variables and axes of a result file. This table drives creating, writing and reading.
 !>
 !> To add a variable of one number per point: give `response` a component, `quantities` a line,
-!> and `get_values` and `set_values` a case of the same name. An axis is one more entry in `axes_of`.
+!> and `get_values` and `set_values` a case of the same name. An axis is one more entry in `axes_of`. What is recorded
+!> of a point, several numbers each, stands in `record_layout`.
 module spurflex_io_results_layout
+   use spurflex_base_checksum, only: checksum_name
    use spurflex_base_kinds, only: wp
    use spurflex_base_text, only: to_text
    use spurflex_io_axes, only: speeds, stiffnesses
    use spurflex_io_case, only: sweep_spec
    use spurflex_measure_response, only: contact_both_flanks, contact_kept, contact_lost, motion_chaotic, &
-      motion_quasi_periodic, motion_unresolved, response, status_diverged, status_inaccurate, status_missing, &
+      motion_quasi_periodic, motion_unresolved, reason_given_steps, reason_max_periods, reason_most_steps, reason_no_step, &
+      reason_non_finite, reason_none, reason_not_confirmed, response, status_diverged, status_inaccurate, status_missing, &
       status_not_settled, status_settled
    use spurflex_steady_outcome, only: motion_of_periods
    use spurflex_steady_sections, only: longest_period
@@ -17,23 +20,28 @@ module spurflex_io_results_layout
 
    public :: axis_type, variable_type
    public :: axes_of, flags_of, rigid_variables, flexible_variables, get_values, set_values
-   public :: real_value, name_length, units_length, long_name_length
+   public :: real_value, reason_flag, checksum_quantity, name_length, units_length, long_name_length
+   public :: most_dimensions, speed_axis, stiffness_axis, rigid_prefix, rigid_description
 
    !> Longest name of a variable.
-   integer, parameter :: name_length = 40
+   integer, parameter :: name_length = 48
    !> Longest unit.
    integer, parameter :: units_length = 8
    !> Longest description.
-   integer, parameter :: long_name_length = 80
+   integer, parameter :: long_name_length = 120
    !> Longest word for a product.
    integer, parameter :: product_length = 16
    !> Most dimensions of a variable.
-   integer, parameter :: most_dimensions = 2
+   integer, parameter :: most_dimensions = 3
 
    !> What a variable holds: reals, plain integers, or one of the sets of flags.
-   integer, parameter :: real_value = 0, plain_integer = 1, motion_flag = 2, status_flag = 3, contact_flag = 4
+   integer, parameter :: real_value = 0, plain_integer = 1, motion_flag = 2, status_flag = 3, contact_flag = 4, &
+      reason_flag = 5
 
    character(len=*), parameter :: speed_axis = 'speed', stiffness_axis = 'support_stiffness', rigid_prefix = 'rigid_'
+   character(len=*), parameter :: rigid_description = 'rigid support: '
+   !> The quantity that guards the others of its point, in the order of writing, and what was recorded of it before them.
+   character(len=*), parameter :: checksum_quantity = 'checksum'
 
    !> An axis of the grid.
    type :: axis_type
@@ -45,6 +53,8 @@ module spurflex_io_results_layout
       character(len=long_name_length) :: long_name
       !> Values along the axis.
       real(wp), allocatable :: values(:)
+      !> Group that holds the scale, with a slash behind it; blank for the root.
+      character(len=name_length) :: group = ''
    end type axis_type
 
    !> A quantity that is known at every point.
@@ -77,6 +87,9 @@ module spurflex_io_results_layout
       integer :: kind
       !> Names of its axes, fastest first, blank where unused.
       character(len=name_length) :: axes(most_dimensions)
+      !> Record that it is a piece of (`record_...` of `record_layout`), the quantity in it as position in the request of the
+      !> deck, and its part: 1 values, 2 rates. 0 where it is no piece of a record.
+      integer :: record = 0, item = 0, part = 0
    end type variable_type
 
    !> Every quantity, in the order of writing: the status goes last, as it says that the others are there.
@@ -102,6 +115,8 @@ module spurflex_io_results_layout
       quantity_type('motion', '1', motion_flag, .false., '', 'class of the steady motion'), &
       quantity_type('periods_integrated', '1', plain_integer, .false., '', 'mesh periods integrated'), &
       quantity_type('contact', '1', contact_flag, .false., '', 'contact of the teeth'), &
+      quantity_type('reason', '1', reason_flag, .false., '', 'why the point is not settled'), &
+      quantity_type(checksum_quantity, '1', plain_integer, .false., '', checksum_name//' of the other values of the point'), &
       quantity_type('status', '1', status_flag, .false., '', 'state of the computation')]
 
 contains
@@ -130,10 +145,10 @@ contains
 
       character(len=name_length) :: axes(most_dimensions)
 
-      axes = [character(len=name_length) :: speed_axis, '']
+      axes = [character(len=name_length) :: speed_axis, '', '']
       variables = variables_of(pack(quantities, sweep%rigid .and. .not. quantities%compares &
                                     .and. asked_for(quantities, products)), &
-         rigid_prefix, 'rigid support: ', axes)
+         rigid_prefix, rigid_description, axes)
    end function rigid_variables
 
    !> The variables of the flexible support, on (support_stiffness, speed) in C order, in the order of writing.
@@ -147,7 +162,7 @@ contains
 
       character(len=name_length) :: axes(most_dimensions)
 
-      axes = [character(len=name_length) :: speed_axis, stiffness_axis]
+      axes = [character(len=name_length) :: speed_axis, stiffness_axis, '']
       variables = variables_of(pack(quantities, sweep%flexible .and. (sweep%rigid .or. .not. quantities%compares) &
                                       .and. asked_for(quantities, products)), '', '', axes)
    end function flexible_variables
@@ -232,6 +247,10 @@ contains
       case (contact_flag)
          values = [contact_kept, contact_lost, contact_both_flanks]
          meanings = 'never_lost lost both_flanks'
+      case (reason_flag)
+         values = [reason_none, reason_non_finite, reason_no_step, reason_max_periods, reason_given_steps, reason_most_steps, &
+                   reason_not_confirmed]
+         meanings = 'none non_finite no_step max_periods given_steps most_steps not_confirmed'
       case default
          values = [integer ::]
          meanings = ''
@@ -284,6 +303,8 @@ contains
          integers = responses%periods_integrated
       case ('contact')
          integers = responses%contact
+      case ('reason')
+         integers = responses%reason
       case ('status')
          integers = responses%status
       end select
@@ -327,6 +348,8 @@ contains
          responses%periods_integrated = integers
       case ('contact')
          responses%contact = integers
+      case ('reason')
+         responses%reason = integers
       case ('status')
          responses%status = integers
       end select

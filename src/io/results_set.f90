@@ -2,16 +2,17 @@
 module spurflex_io_results_set
    use hdf5, only: h5dclose_f, h5dget_space_f, h5dopen_f, h5sclose_f, h5sget_simple_extent_dims_f, &
       h5sget_simple_extent_ndims_f, hid_t, hsize_t
+   use spurflex_base_checksum, only: extended
    use spurflex_base_error, only: error_type, fatal_error
-   use spurflex_base_kinds, only: wp
+   use spurflex_base_kinds, only: i4, wp
    use spurflex_io_hdf5, only: check
    use spurflex_io_hdf5_run, only: end_run, read_run, run_type, select_run, write_run
-   use spurflex_io_results_layout, only: get_values, real_value, set_values, variable_type
+   use spurflex_io_results_layout, only: checksum_quantity, get_values, real_value, set_values, variable_type
    use spurflex_measure_response, only: nan, response, status_missing
    implicit none
    private
 
-   public :: variable_set, open_set, close_set, write_points, read_points, read_states
+   public :: variable_set, open_set, close_set, write_points, read_points, read_states, read_flags
 
    !> Open variables on the same axes.
    type :: variable_set
@@ -91,8 +92,8 @@ contains
       set%space = -1_hid_t
    end subroutine close_set
 
-   !> Write a block of points. Each rank writes for itself.
-   subroutine write_points(set, first, extent, responses, eta, error)
+   !> Write a block of points, the checksum and then the status last. Each rank writes for itself.
+   subroutine write_points(set, first, extent, responses, eta, checksums, error)
       !> The set.
       type(variable_set), intent(in) :: set
       !> First point from 1, fastest index first, shape (dimensions).
@@ -103,11 +104,14 @@ contains
       type(response), intent(in) :: responses(:)
       !> Changes by the flexible support [percent] and their error, shape (3, points); NaN where unknown.
       real(wp), intent(in) :: eta(:, :)
+      !> Checksum of what was recorded of each point before, shape (points); 0 where nothing was.
+      integer(i4), intent(in) :: checksums(:)
       !> Set if they cannot be written.
       type(error_type), allocatable, intent(out) :: error
 
       type(run_type) :: run
       real(wp) :: reals(size(responses))
+      integer(i4) :: sums(size(responses))
       integer :: integers(size(responses)), i
 
       if (size(responses) == 0) return
@@ -115,7 +119,21 @@ contains
       if (allocated(error)) return
       reals = nan()
       integers = 0
+      sums = checksums
+      ! The checksum covers the status, which is written behind it.
       do i = 1, size(set%datasets)
+         if (set%variables(i)%quantity == checksum_quantity) cycle
+         call get_values(set%variables(i)%quantity, responses, eta, reals, integers)
+         if (set%variables(i)%kind == real_value) then
+            sums = extended(sums, reals)
+         else
+            sums = extended(sums, integers)
+         end if
+      end do
+      ! A missing point has none.
+      where (responses%status == status_missing) sums = 0_i4
+      do i = 1, size(set%datasets)
+         integers = sums
          call get_values(set%variables(i)%quantity, responses, eta, reals, integers)
          if (set%variables(i)%kind == real_value) then
             call write_run(run, set%datasets(i), reals, error)
@@ -168,18 +186,34 @@ contains
       !> Set if they cannot be read.
       type(error_type), allocatable, intent(out) :: error
 
+      states = status_missing
+      call read_flags(set, 'status', spread(1, 1, size(set%extents)), set%extents, states, error)
+   end subroutine read_states
+
+   !> Read an integer quantity of a block of points.
+   subroutine read_flags(set, quantity, first, extent, flags, error)
+      !> The set.
+      type(variable_set), intent(in) :: set
+      !> Name of the quantity.
+      character(len=*), intent(in) :: quantity
+      !> First point from 1 and extents of the block, fastest index first, shape (dimensions).
+      integer, intent(in) :: first(:), extent(:)
+      !> Its values in the order of the file, shape (points); left alone if there is no such quantity.
+      integer, contiguous, intent(inout) :: flags(:)
+      !> Set if they cannot be read.
+      type(error_type), allocatable, intent(out) :: error
+
       type(run_type) :: run
       integer :: i
 
-      states = status_missing
-      call select_run(run, set%space, spread(1, 1, size(set%extents)), set%extents, error)
+      call select_run(run, set%space, first, extent, error)
       if (allocated(error)) return
       do i = 1, size(set%datasets)
-         if (set%variables(i)%quantity /= 'status') cycle
-         call read_run(run, set%datasets(i), states, error)
+         if (set%variables(i)%quantity /= quantity) cycle
+         call read_run(run, set%datasets(i), flags, error)
          if (allocated(error)) return
       end do
       call end_run(run, error)
-   end subroutine read_states
+   end subroutine read_flags
 
 end module spurflex_io_results_set

@@ -6,6 +6,7 @@ module spurflex_io_schema
    use spurflex_base_kinds, only: wp
    use spurflex_base_text, only: to_text
    use spurflex_integrate_options, only: solver_options
+   use spurflex_measure_record, only: observables, record_request
    implicit none
    private
 
@@ -35,7 +36,7 @@ module spurflex_io_schema
    !> Most harmonics of the mesh excitation.
    integer, parameter :: most_harmonics = 64
    !> Longest allowed word.
-   integer, parameter :: word_length = 16
+   integer, parameter :: word_length = 24
    !> Most words in the list of products.
    integer, parameter :: most_products = 16
 
@@ -75,10 +76,12 @@ module spurflex_io_schema
       integer :: most = 1
       !> Allowed numbers.
       type(range_type) :: range = range_type()
+      !> It concerns one run only: no part of the resolved deck, by which a result file knows its deck again.
+      logical :: of_run = .false.
       !> Allowed words, one blank between them and at least one behind them.
-      character(len=32) :: words = ''
+      character(len=128) :: words = ''
       !> What it means.
-      character(len=130) :: meaning = ''
+      character(len=180) :: meaning = ''
    end type key_spec
 
    type(range_type), parameter :: masses = range_type(0.0_wp, 1.0e12_wp, above=.true.)
@@ -170,6 +173,7 @@ contains
       type(key_spec), allocatable :: keys(:)
 
       type(solver_options) :: solver
+      type(record_request) :: record
 
       keys = [ &
          key_spec('sweep', 'support', kind_word, words='rigid flexible both', &
@@ -185,6 +189,9 @@ contains
          meaning='Number of support stiffnesses, evenly spaced in their logarithm.'), &
          key_spec('sweep', 'start', kind_word, need=need_never, default='''static''', words='rest static up down', &
          meaning='Start: zero state, static equilibrium, or on from the next lower (up) or higher (down) speed.'), &
+         key_spec('sweep', 'wall_clock_limit', kind_real, 'min', need_never, '0.0', range=range_type(0.0_wp, 1.0e6_wp), &
+         of_run=.true., meaning='Time from the start of the program within which it stops by itself, to be gone on with; '// &
+         '0.0: no limit. May change between runs.'), &
          key_spec('solver', 'integrator', kind_word, need=need_never, default='''newmark''', words='newmark collocation', &
          meaning='Time integration: Newmark-beta, or exponential collocation of order eight with located crossings.'), &
          key_spec('solver', 'steps_per_period', kind_integer, need=need_never, default=to_text(solver%steps_per_period), &
@@ -205,9 +212,38 @@ contains
          key_spec('output', 'file', kind_text, need=need_never, default='name of the deck + .h5', derived=.true., &
          meaning='Result file, relative to the working folder.'), &
          key_spec('output', 'products', kind_word, need=need_never, default='''map''', most=most_products, &
-         words='map floquet lyapunov', &
-         meaning='What is written: map, the steady response, always; floquet, lyapunov: multipliers and exponents.')]
+         words='map floquet lyapunov spectrum poincare history', &
+         meaning='What is written: map, the steady response, always; floquet, lyapunov: multipliers and exponents; '// &
+         'spectrum, poincare, history: records of the steady motion.'), &
+         key_spec('output', 'quantities', kind_word, need=need_never, default='''y1''', most=size(observables), &
+         words=observable_words(), meaning='Quantities recorded by the products spectrum, poincare and history; '// &
+         'xm, ym and thetam need a flexible support.'), &
+         key_spec('output', 'highest_order', kind_real, need=need_never, default=to_text(record%highest_order), &
+         range=range_type(0.0_wp, 1.0e3_wp, above=.true.), &
+         meaning='Multiple of the mesh frequency up to which the spectrum goes.'), &
+         key_spec('output', 'spectrum_periods', kind_integer, need=need_never, default=to_text(record%spectrum_periods), &
+         range=range_type(1.0_wp, 1.0e4_wp), &
+         meaning='Mesh periods of the window of the spectrum; its resolution is 1/spectrum_periods of the mesh frequency.'), &
+         key_spec('output', 'sections', kind_integer, need=need_never, default=to_text(record%sections), &
+         range=range_type(1.0_wp, 1.0e6_wp), meaning='Points of the Poincare section, one a mesh period.'), &
+         key_spec('output', 'history_periods', kind_integer, need=need_never, default=to_text(record%history_periods), &
+         range=range_type(1.0_wp, 1.0e5_wp), meaning='Mesh periods of the time history.'), &
+         key_spec('output', 'history_samples', kind_integer, need=need_never, default=to_text(record%history_samples), &
+         range=range_type(1.0_wp, 1.0e4_wp), meaning='Samples of the time history in each mesh period.')]
    end function run_keys
+
+   !> The quantities that can be recorded, as words.
+   pure function observable_words() result(words)
+      !> Their names, one blank behind each.
+      character(len=128) :: words
+
+      integer :: i
+
+      words = observables(1)%name
+      do i = 2, size(observables)
+         words = trim(words)//' '//observables(i)%name
+      end do
+   end function observable_words
 
    !> Position of a key in the table.
    pure function find_key(keys, group, key) result(position)

@@ -87,7 +87,8 @@ contains
       !> Number of lines.
       integer :: lines
 
-      lines = floor(request%highest_order*request%spectrum_periods) + 1
+      ! The product of a decimal fraction may come out a little less than whole.
+      lines = floor(request%highest_order*request%spectrum_periods*(1.0_wp + 4.0_wp*epsilon(1.0_wp))) + 1
    end function lines_of
 
    !> Samples of the history that a deck asks for, both ends included.

@@ -16,7 +16,7 @@ module spurflex_measure_recorder
    use spurflex_measure_observation, only: observation_type, observed_equations, observe
    use spurflex_measure_record, only: record_request, record_type, lines_of, samples_of, records, mesh_force_observable
    use spurflex_measure_response, only: response, nan, status_missing, status_diverged
-   use spurflex_measure_spectrum, only: spectrum_maker, find_spectrum, release_spectra
+   use spurflex_measure_spectrum, only: spectrum_maker, series_type, samples_of_spectrum, strides_of, make_spectra, release_spectra
    use spurflex_model_equations, only: equations_type
    use spurflex_steady_outcome, only: periods_of_motion
    use spurflex_steady_sections, only: weighted_norm
@@ -25,13 +25,6 @@ module spurflex_measure_recorder
    private
 
    public :: recorder_type, new_recorder, release_recorder
-
-   !> Samples of the spectrum in a mesh period at least, for each order of the axis, and for each step of collocation, which goes
-   !> with the highest natural frequency.
-   integer, parameter :: fewest_samples = 64, samples_per_order = 8, samples_per_step = 4
-
-   !> Times as many where the mesh force is wanted: its rate jumps where the teeth part, and its lines fall off slowly.
-   integer, parameter :: samples_for_force = 4
 
    !> Steps of the record, in units of those that collocation begins with.
    integer, parameter :: finer = 2
@@ -96,7 +89,7 @@ contains
    end subroutine release_recorder
 
    !> Record the motion of one point. What cannot be recorded is NaN: a point that diverged, a quantity that the support lacks.
-   subroutine record_motion(self, equations, position, velocity, answer, record, visitor)
+   subroutine record_motion(self, equations, position, velocity, answer, record, error, visitor)
       !> The recorder.
       class(recorder_type), intent(inout) :: self
       !> Equations of motion of the point.
@@ -107,6 +100,8 @@ contains
       type(response), intent(in) :: answer
       !> The record.
       type(record_type), intent(out) :: record
+      !> Set where the motion cannot be integrated or transformed, though it was found.
+      type(error_type), allocatable, intent(out) :: error
       !> Let in between the periods.
       class(attendant), intent(inout), optional :: visitor
 
@@ -115,9 +110,9 @@ contains
       call empty_record(self%request, record)
       if (.not. records(self%request) .or. answer%status == status_missing .or. answer%status == status_diverged) return
       if (present(visitor)) then
-         call follow_motion(self, equations, position, velocity, periods_of_motion(answer%motion), visitor, record)
+         call follow_motion(self, equations, position, velocity, periods_of_motion(answer%motion), visitor, record, error)
       else
-         call follow_motion(self, equations, position, velocity, periods_of_motion(answer%motion), nobody, record)
+         call follow_motion(self, equations, position, velocity, periods_of_motion(answer%motion), nobody, record, error)
       end if
    end subroutine record_motion
 
@@ -136,7 +131,7 @@ contains
    end subroutine empty_record
 
    !> Integrate the motion and take from it what is asked for.
-   subroutine follow_motion(self, equations, position, velocity, periods, visitor, record)
+   subroutine follow_motion(self, equations, position, velocity, periods, visitor, record, error)
       !> The recorder.
       class(recorder_type), intent(inout) :: self
       !> Equations of motion of the point.
@@ -149,13 +144,16 @@ contains
       class(attendant), intent(inout) :: visitor
       !> The record, filled in.
       type(record_type), intent(inout) :: record
+      !> Set where the motion cannot be integrated or transformed.
+      type(error_type), allocatable, intent(out) :: error
 
       type(equations_type) :: observed
       type(observation_type) :: observation
       type(grid_type) :: sections, samples, history
-      type(error_type), allocatable :: error
-      real(wp), allocatable :: state(:), signal(:, :), past(:, :, :), section(:, :, :)
-      integer :: span, spectrum_span, section_span, history_span, coarse, steps, p
+      type(series_type) :: signal(size(self%request%quantities))
+      real(wp), allocatable :: state(:), past(:, :, :), section(:, :, :)
+      integer :: stride(size(self%request%quantities))
+      integer :: span, spectrum_span, section_span, history_span, coarse, steps, p, i
 
       call observed_equations(equations, self%request%quantities, observed, observation)
       coarse = first_steps(equations)
@@ -174,7 +172,10 @@ contains
          call set_grid(samples_of_spectrum(request, coarse), self%map%period, observed, request%quantities, .false., samples)
          call set_grid(request%history_samples, self%map%period, observed, request%quantities, .true., history)
          allocate (section(section_span, 2, size(request%quantities)))
-         allocate (signal(spectrum_span*size(samples%time), size(request%quantities)))
+         stride = strides_of(request)
+         do i = 1, size(signal)
+            allocate (signal(i)%value(spectrum_span*(size(samples%time)/stride(i))))
+         end do
          allocate (past(history_span*size(history%time) + 1, 2, size(request%quantities)), source=0.0_wp)
       end associate
       span = max(section_span, spectrum_span, history_span)
@@ -187,9 +188,11 @@ contains
          end if
          if (p <= spectrum_span) then
             call look(self%orbit, observation, samples)
-            associate (n => size(samples%time))
-               signal((p - 1)*n + 1:p*n, :) = samples%seen(:, 1, :)
-            end associate
+            do i = 1, size(signal)
+               associate (n => size(samples%time)/stride(i))
+                  signal(i)%value((p - 1)*n + 1:p*n) = samples%seen(::stride(i), 1, i)
+               end associate
+            end do
          end if
          if (p <= history_span) then
             call look(self%orbit, observation, history)
@@ -216,7 +219,7 @@ contains
             record%history = past
          end if
       end if
-      if (self%request%spectrum) call make_spectra(self, observation, signal, periods, record%spectrum)
+      if (self%request%spectrum) call make_spectra(self%spectra, self%request, observation, signal, periods, record%spectrum, error)
    end subroutine follow_motion
 
    !> Mesh periods that must be integrated for a product.
@@ -233,22 +236,6 @@ contains
       span = 0
       if (wanted) span = merge(periods, longest, periods > 0)
    end function span_of
-
-   !> Samples of the spectrum in a mesh period: a power of two.
-   pure function samples_of_spectrum(request, steps) result(samples)
-      !> What is asked for.
-      type(record_request), intent(in) :: request
-      !> Steps that collocation begins with.
-      integer, intent(in) :: steps
-      !> Number of samples.
-      integer :: samples
-
-      samples = fewest_samples
-      do while (samples < max(samples_per_order*request%highest_order, real(samples_per_step*steps, wp)))
-         samples = 2*samples
-      end do
-      if (any(request%quantities == mesh_force_observable)) samples = samples_for_force*samples
-   end function samples_of_spectrum
 
    !> Find the motion again, as the map of the record has it; where that fails the section remains as it was given.
    subroutine close_motion(map, periods, visitor, state)
@@ -336,45 +323,5 @@ contains
          repeated(i, :, :) = series(1 + mod(i - 1, size(series, 1)), :, :)
       end do
    end subroutine repeat_series
-
-   !> The spectra of what was sampled.
-   subroutine make_spectra(self, observation, signal, periods, spectrum)
-      !> The recorder.
-      class(recorder_type), intent(inout) :: self
-      !> What is observed.
-      type(observation_type), intent(in) :: observation
-      !> Samples over the period of the motion, or over the window, shape (samples, quantities).
-      real(wp), intent(in) :: signal(:, :)
-      !> Mesh periods after which the motion repeats; 0 if it does not.
-      integer, intent(in) :: periods
-      !> Amplitudes, shape (lines, quantities).
-      real(wp), intent(inout) :: spectrum(:, :)
-
-      type(error_type), allocatable :: error
-      real(wp), allocatable :: amplitude(:), repeated(:)
-      integer :: i, j, n, per_period, window
-      logical :: fits
-
-      window = self%request%spectrum_periods
-      fits = .false.
-      if (periods > 0) fits = mod(window, periods) == 0
-      n = size(signal, 1)
-      allocate (amplitude(size(spectrum, 1)))
-      do i = 1, size(spectrum, 2)
-         if (.not. observation%exists(i)) cycle
-         if (fits) then
-            call find_spectrum(self%spectra, signal(:, i), .false., window/periods, amplitude, error)
-         else if (periods > 0) then
-            per_period = n/periods
-            repeated = [(signal(1 + mod(j, n), i), j=0, window*per_period - 1)]
-            call find_spectrum(self%spectra, repeated, .true., 1, amplitude, error)
-         else
-            call find_spectrum(self%spectra, signal(:, i), .true., 1, amplitude, error)
-         end if
-         if (allocated(error)) return
-         spectrum(:, i) = amplitude
-         spectrum(1, i) = spectrum(1, i) + observation%offset(i)
-      end do
-   end subroutine make_spectra
 
 end module spurflex_measure_recorder

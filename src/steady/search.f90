@@ -11,7 +11,8 @@ module spurflex_steady_search
    use spurflex_integrate_options, only: solver_options
    use spurflex_integrate_period_map, only: period_map
    use spurflex_steady_outcome, only: steady_motion, status_missing, status_settled, status_not_settled, status_diverged, &
-      motion_unresolved, motion_quasi_periodic, motion_chaotic, motion_of_periods, longest_named
+      reason_non_finite, reason_max_periods, motion_unresolved, motion_quasi_periodic, motion_chaotic, motion_of_periods, &
+      longest_named
    use spurflex_steady_sections, only: weighted_norm
    use spurflex_steady_shooting, only: periodic_orbit, contact_is_kept
    use spurflex_steady_stability, only: find_stable_orbits, largest_multiplier
@@ -131,6 +132,7 @@ contains
          if (motions(i)%status /= status_missing) cycle
          motions(i)%motion = motion_unresolved
          motions(i)%status = merge(status_not_settled, status_diverged, transients(i)%sound)
+         motions(i)%reason = merge(reason_max_periods, reason_non_finite, transients(i)%sound)
       end do
    end subroutine find_steady_motions
 

@@ -1,7 +1,7 @@
 !> What a rank does now and then during long work: answer other ranks and say how far the sweep is.
 module spurflex_sweep_attendance
-   use mpi_f08, only: mpi_wtime
    use spurflex_base_attendant, only: attendant
+   use spurflex_base_clock, only: steady_seconds
    use spurflex_base_kinds, only: wp, i8
    use spurflex_base_text, only: to_text
    use spurflex_io_log, only: logger
@@ -39,7 +39,7 @@ contains
 
       real(wp) :: now
 
-      now = mpi_wtime()
+      now = steady_seconds()
       if (now - self%last < interval) return
       self%last = now
       call self%schedule%serve()

@@ -5,10 +5,13 @@
 !> a slow chunk at the end would leave the other ranks idle. With the starts 'up' and 'down' each point begins where its
 !> neighbour ended, and a chunk is some whole rows side by side.
 module spurflex_sweep_plan
-   use spurflex_base_kinds, only: i8
-   use spurflex_base_text, only: to_text
+   use spurflex_base_kinds, only: i8, wp
+   use spurflex_base_text, only: fixed_text, to_text
    use spurflex_integrate_options, only: start_rest, start_static, start_up, start_down
    use spurflex_io_case, only: case_type
+   use spurflex_io_record_layout, only: is_recorded, record_bytes, record_kinds, record_section, &
+      record_spectrum
+   use spurflex_measure_record, only: lines_of, observables, records
    use spurflex_measure_response, only: status_missing
    use spurflex_model_equations, only: rigid_dof, flexible_dof
    implicit none
@@ -17,7 +20,7 @@ module spurflex_sweep_plan
    public :: chunk_type, plan_row, plan_grid, is_chained, describe_plan
 
    !> Points handed out at once at most: few enough to balance, enough to write in one go.
-   integer, parameter :: largest_chunk = 128
+   integer, parameter :: largest_chunk = 256
 
    !> Chunks that each rank should get at least, where there are enough points.
    integer, parameter :: chunks_per_rank = 64
@@ -197,6 +200,7 @@ contains
          'skipped: eta, which needs both supports'
       if (.not. any(case%output%products == 'floquet' .or. case%output%products == 'lyapunov')) text = text//newline// &
          'skipped: Floquet multipliers, which no product asks for; stability is decided without them'
+      text = text//newline//describe_records(case)
       select case (case%solver%start)
       case (start_rest)
          start = 'from rest, every point on its own'
@@ -210,5 +214,54 @@ contains
       text = text//newline//'start: '//start//newline//'steps: '//steps//'; at most '//to_text(case%solver%max_periods) &
              //' mesh periods of transient a point'
    end function describe_plan
+
+   !> What is recorded of each point and how large that is in the file, and what is not.
+   pure function describe_records(case) result(text)
+      !> Case.
+      type(case_type), intent(in) :: case
+      !> One or more lines.
+      character(len=:), allocatable :: text
+
+      character(len=*), parameter :: newline = new_line('a')
+      character(len=*), parameter :: names(record_kinds) = [character(len=16) :: 'spectrum', 'Poincare section', 'history']
+      real(wp), parameter :: megabyte = 1.0e6_wp
+      character(len=:), allocatable :: extent, quantities, skipped
+      integer :: kind, i
+
+      text = ''
+      skipped = ''
+      do kind = 1, record_kinds
+         if (is_recorded(case%output%record, kind)) cycle
+         if (skipped /= '') skipped = skipped//', '
+         skipped = skipped//trim(names(kind))
+      end do
+      if (records(case%output%record)) then
+         quantities = ''
+         do i = 1, size(case%output%record%quantities)
+            quantities = quantities//' '//trim(observables(case%output%record%quantities(i))%name)
+         end do
+         text = 'recorded of each point:'//quantities
+      end if
+      associate (record => case%output%record)
+         do kind = 1, record_kinds
+            if (.not. is_recorded(record, kind)) cycle
+            select case (kind)
+            case (record_spectrum)
+               extent = to_text(lines_of(record))//' lines up to order '//to_text(record%highest_order)//', 1/' &
+                        //to_text(record%spectrum_periods)//' apart'
+            case (record_section)
+               extent = to_text(record%sections)//' points with their rates'
+            case default
+               extent = to_text(record%history_periods)//' mesh periods of '//to_text(record%history_samples) &
+                        //' samples, with their rates'
+            end select
+            text = text//newline//'  '//trim(names(kind))//': '//extent//'; ' &
+                   //fixed_text(record_bytes(case%sweep, record, kind)/megabyte, 1)//' MB in the file'
+         end do
+      end associate
+      if (skipped == '') return
+      if (text /= '') text = text//newline
+      text = text//'skipped: '//skipped//', which no product asks for'
+   end function describe_records
 
 end module spurflex_sweep_plan

@@ -2,20 +2,24 @@
 module spurflex_sweep_worker
    use mpi_f08, only: MPI_Comm, MPI_INTEGER8, MPI_DOUBLE_PRECISION, MPI_SUM, mpi_reduce
    use spurflex_base_error, only: error_type
-   use spurflex_base_kinds, only: wp, i8
+   use spurflex_base_kinds, only: wp, i4, i8
    use spurflex_integrate_options, only: solver_options, start_rest, start_down
    use spurflex_io_axes, only: speeds, stiffnesses
    use spurflex_io_case, only: case_type
    use spurflex_io_log, only: logger
-   use spurflex_io_results, only: results_file, write_rigid, write_flexible
-   use spurflex_measure_effort, only: effort_type, ways, stages
+   use spurflex_io_results, only: describe_damage, results_file, write_rigid, write_flexible
+   use spurflex_measure_effort, only: effort_type, ways, stages, kinds_of_steps
    use spurflex_measure_points, only: solver_type, new_solver, respond
+   use spurflex_measure_record, only: records
+   use spurflex_measure_recorder, only: recorder_type, new_recorder, release_recorder
    use spurflex_measure_response, only: response, nan, status_diverged
    use spurflex_model_equations, only: equations_type, new_equations, rest_deviation
    use spurflex_model_parameters, only: operating_point, support_rigid, support_flexible
    use spurflex_sweep_attendance, only: sweep_attendant
    use spurflex_sweep_plan, only: chunk_type, is_chained
+   use spurflex_sweep_recording, only: record_points
    use spurflex_sweep_schedule, only: new_scheduler
+   use spurflex_sweep_timekeeper, only: timekeeper
    implicit none
    private
 
@@ -27,7 +31,7 @@ module spurflex_sweep_worker
 contains
 
    !> Solve the points of chunks as long as there are any. All ranks call this together.
-   subroutine work_on_chunks(case, chunks, comm, results, log, rigid_deformation, total, effort, error)
+   subroutine work_on_chunks(case, chunks, comm, results, log, keeper, rigid_deformation, total, effort, error)
       !> Case.
       type(case_type), intent(in) :: case
       !> Chunks, the same on every rank.
@@ -37,7 +41,9 @@ contains
       !> Open result file.
       type(results_file), intent(in) :: results
       !> Logger.
-      type(logger), intent(in), target :: log
+      type(logger), intent(inout), target :: log
+      !> This rank's time.
+      type(timekeeper), intent(inout), target :: keeper
       !> Largest bearing deformations of the rigid twins and their relative error, shape (3, speed): filled in where this rank
       !> solves rigid points; unallocated if they are not asked for.
       real(wp), allocatable, intent(inout) :: rigid_deformation(:, :)
@@ -51,48 +57,69 @@ contains
       type(sweep_attendant) :: visitor
       type(solver_type), allocatable :: solver
       type(solver_options) :: options
+      type(recorder_type), allocatable :: recorder
       type(response), allocatable :: responses(:)
+      integer(i4), allocatable :: checksums(:)
+      character(len=:), allocatable :: damage
       integer :: number, i
       logical :: available
 
       visitor%log => log
       visitor%points = sum(int(chunks%rows, i8)*chunks%count)
-      call new_scheduler(visitor%schedule, comm, size(chunks))
+      call new_scheduler(visitor%schedule, comm, size(chunks), keeper)
       options = case%solver
       options%multipliers = any(case%output%products == 'floquet' .or. case%output%products == 'lyapunov')
       allocate (solver)
       call new_solver(options, solver)
+      allocate (recorder)
+      call new_recorder(options, case%output%record, recorder)
+      if (size(chunks) > 0) then
+         damage = describe_damage(results, rigid=chunks(1)%row == 0)
+         if (damage /= '') call log%say(damage)
+      end if
       do
          call visitor%schedule%take(number, available)
          if (.not. available) exit
          allocate (responses(chunks(number)%rows*chunks(number)%count))
-         call solve_chunk(case, chunks(number), solver, visitor, responses)
-         call write_chunk(chunks(number), responses, results, rigid_deformation, error)
+         allocate (checksums(size(responses)), source=0_i4)
+         call solve_chunk(case, chunks(number), solver, recorder, results, visitor, responses, checksums, error)
+         if (allocated(error)) return
+         call write_chunk(chunks(number), responses, checksums, results, rigid_deformation, error)
          if (allocated(error)) return
          do i = 1, size(responses)
             call visitor%schedule%count_point(responses(i)%status)
          end do
-         deallocate (responses)
+         deallocate (responses, checksums)
       end do
+      call release_recorder(recorder)
       call visitor%schedule%finish()
       total = visitor%schedule%total
       effort = effort_type()
       call mpi_reduce(solver%effort%points, effort%points, ways, MPI_INTEGER8, MPI_SUM, 0, comm)
+      call mpi_reduce(solver%effort%steps, effort%steps, kinds_of_steps, MPI_INTEGER8, MPI_SUM, 0, comm)
       call mpi_reduce(solver%effort%seconds, effort%seconds, stages, MPI_DOUBLE_PRECISION, MPI_SUM, 0, comm)
    end subroutine work_on_chunks
 
-   !> Solve the points of a chunk.
-   subroutine solve_chunk(case, chunk, solver, visitor, responses)
+   !> Solve the points of a chunk; record what is asked for of them, and write that.
+   subroutine solve_chunk(case, chunk, solver, recorder, results, visitor, responses, checksums, error)
       !> Case.
       type(case_type), intent(in) :: case
       !> The chunk.
       type(chunk_type), intent(in) :: chunk
       !> Solver.
       type(solver_type), intent(inout) :: solver
+      !> Records motions.
+      type(recorder_type), intent(inout) :: recorder
+      !> Open result file.
+      type(results_file), intent(in) :: results
       !> Let in now and then.
       type(sweep_attendant), intent(inout) :: visitor
       !> Responses at the speeds of one row after the other, shape (count rows).
       type(response), intent(out) :: responses(:)
+      !> Checksums of what was recorded, shape (count rows); left alone if nothing is.
+      integer(i4), intent(inout) :: checksums(:)
+      !> Set where what was recorded cannot be written.
+      type(error_type), allocatable, intent(out) :: error
 
       type(equations_type), allocatable :: equations(:)
       real(wp), allocatable :: positions(:, :), velocities(:, :)
@@ -101,12 +128,15 @@ contains
       if (.not. is_chained(case)) then
          call set_points(case, chunk, 1, chunk%count, equations, positions, velocities)
          call respond(solver, equations, positions, velocities, visitor, responses)
+         if (records(case%output%record)) call record_points(case%output%record, recorder, chunk, equations, positions, &
+                                                             velocities, responses, results, visitor, checksums, error)
          return
       end if
       ! Rows side by side, each point from where its neighbour ended.
       do k = 1, chunk%count
          i = merge(chunk%count + 1 - k, k, case%solver%start == start_down)
          call continue_rows(i, k == 1)
+         if (allocated(error)) return
       end do
 
    contains
@@ -119,6 +149,8 @@ contains
          logical, intent(in) :: begins
 
          type(response) :: column(chunk%rows)
+         integer(i4) :: column_checksums(chunk%rows)
+         type(chunk_type) :: tile
          real(wp), allocatable :: start_positions(:, :), start_velocities(:, :)
          integer :: row, next
 
@@ -136,6 +168,13 @@ contains
          end if
          call respond(solver, equations, positions, velocities, visitor, column)
          responses(i::chunk%count) = column
+         if (.not. records(case%output%record)) return
+         tile = chunk
+         tile%first = chunk%first + i - 1
+         tile%count = 1
+         call record_points(case%output%record, recorder, tile, equations, positions, velocities, column, results, visitor, &
+                            column_checksums, error)
+         checksums(i::chunk%count) = column_checksums
       end subroutine continue_rows
 
    end subroutine solve_chunk
@@ -189,11 +228,13 @@ contains
    end subroutine set_start
 
    !> Write a complete chunk; keep rigid twins, compare with them.
-   subroutine write_chunk(chunk, responses, results, rigid_deformation, error)
+   subroutine write_chunk(chunk, responses, checksums, results, rigid_deformation, error)
       !> The chunk.
       type(chunk_type), intent(in) :: chunk
       !> Its responses, shape (count rows).
       type(response), intent(in) :: responses(:)
+      !> Checksums of what was recorded, shape (count rows).
+      integer(i4), intent(in) :: checksums(:)
       !> Open result file.
       type(results_file), intent(in) :: results
       !> Rigid twins, shape (3, speed); unallocated if they are not asked for.
@@ -210,7 +251,7 @@ contains
             if (responses(i)%status == status_diverged) cycle
             rigid_deformation(:, chunk%first + i - 1) = [responses(i)%bearing_deformation_max, responses(i)%error_estimate]
          end do
-         call write_rigid(results, chunk%first, responses, error)
+         call write_rigid(results, chunk%first, responses, error, checksums)
          return
       end if
       if (allocated(rigid_deformation)) then
@@ -223,7 +264,7 @@ contains
             eta(3, i) = 100.0_wp*maxval(ratio)*(responses(i)%error_estimate + rigid_deformation(3, twin))
          end do
       end if
-      call write_flexible(results, chunk%row, chunk%rows, chunk%first, responses, eta, error)
+      call write_flexible(results, chunk%row, chunk%rows, chunk%first, responses, eta, error, checksums)
    end subroutine write_chunk
 
 end module spurflex_sweep_worker

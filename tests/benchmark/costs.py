@@ -23,7 +23,7 @@ import numpy as np
 import schedule
 
 ALONE = 1  # points of a chunk of which the tiles of the program are not made
-LENGTHS = (8, 16, 32, 64, 128)  # points that a tile is meant to have
+LENGTHS = (8, 16, 32, 64, 128, 256)  # points that a tile is meant to have
 PARTS = ("flexible", "rigid")
 LATE = 2e-4  # s between two looks, after which the watcher was held up
 NANOSECOND = 1e-9  # s

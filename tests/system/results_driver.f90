@@ -12,9 +12,10 @@ program results_driver
    use spurflex_base_text, only: to_text
    use spurflex_io_case, only: case_type
    use spurflex_io_provenance, only: collect_provenance, provenance_type
-   use spurflex_io_results, only: close_results, create_results, open_results, read_rigid, read_status, results_file, &
-      write_flexible, write_rigid
-   use spurflex_measure_response, only: contact_lost, response, status_missing, status_settled
+   use spurflex_io_results, only: close_results, create_results, describe_damage, open_results, read_rigid, read_status, &
+      results_file, write_flexible, write_rigid
+   use spurflex_measure_response, only: contact_lost, reason_most_steps, reason_none, response, status_missing, &
+      status_settled
    implicit none
 
    interface
@@ -65,6 +66,8 @@ program results_driver
    end select
    call give_up_on(error)
    if (mode == 'time') call report('created')
+   if (rank == 0) write (output_unit, '(a)') 'rigid: '//describe_damage(results, rigid=.true.), &
+      'flexible: '//describe_damage(results, rigid=.false.)
 
    allocate (rigid_status(case%sweep%speed_count), flexible_status(case%sweep%speed_count, case%sweep%stiffness_count))
    call read_status(results, rigid_status, flexible_status, error)
@@ -133,6 +136,7 @@ contains
       point%error_estimate = 1.0_wp/place
       point%motion = 1 + mod(speed, 8)
       point%status = status_settled
+      point%reason = merge(reason_most_steps, reason_none, mod(speed, 2) == 0)
       point%periods_integrated = speed + 1000*stiffness
       point%contact = contact_lost
    end function response_at
@@ -184,9 +188,13 @@ contains
       call give_up_on(error)
       do i = 1, size(responses)
          if (.not. case%sweep%rigid) exit
+         ! What is missing is not a number.
+         right = right .and. rigid_status(i) == status_settled
+         if (.not. right) exit
          expected = response_at(i, 0)
-         right = right .and. rigid_status(i) == status_settled .and. responses(i)%status == expected%status &
-            .and. responses(i)%motion == expected%motion .and. responses(i)%contact == expected%contact &
+         right = responses(i)%status == expected%status &
+            .and. responses(i)%reason == expected%reason .and. responses(i)%motion == expected%motion &
+            .and. responses(i)%contact == expected%contact &
             .and. responses(i)%periods_integrated == expected%periods_integrated &
             .and. all(abs(reals_of(responses(i)) - reals_of(expected)) <= 0.0_wp)
       end do

@@ -108,6 +108,16 @@ def test_runs_without_mpirun(run, quick_deck, tmp_path):
     assert file.is_file()
 
 
+def test_missing_folder_is_a_fault_of_the_deck(run, quick_deck, tmp_path):
+    deck = tmp_path / "deck.nml"
+    deck.write_text(re.sub(r"file *= *'[^']*'", "file = 'absent/map.h5'", quick_deck.read_text()))
+    done = run(deck)
+    assert done.returncode == 2
+    assert "'absent/map.h5'" in done.stderr
+    assert "make its folder first, or change file in &output" in done.stderr
+    assert not (tmp_path / "absent").exists()
+
+
 def test_second_run_recognises_complete_file(run, quick_deck, tmp_path):
     file = run_quick(run, quick_deck, tmp_path / "twice", 2)
     before = file.read_bytes()

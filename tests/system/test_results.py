@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import time
+import zlib
 from pathlib import Path
 
 import h5py
@@ -24,9 +25,27 @@ REALS = {
     "bearing2_deformation_max": "m",
     "error_estimate": "1",
 }
-FLAGS = ("motion", "status", "contact")
-COMMON = {*REALS, *FLAGS, "periods_integrated"}
+FLAGS = ("motion", "status", "contact", "reason")
+COMMON = {*REALS, *FLAGS, "periods_integrated", "checksum"}
 ETA = {"eta1", "eta2", "eta_error"}
+# What a checksum covers, in its order.
+COVERED = (
+    "y1_amplitude",
+    "y1_rms",
+    "y1_max",
+    "y1_min",
+    "bearing1_deformation_max",
+    "bearing2_deformation_max",
+    "eta1",
+    "eta2",
+    "eta_error",
+    "error_estimate",
+    "motion",
+    "periods_integrated",
+    "contact",
+    "reason",
+    "status",
+)
 RIGID = {f"rigid_{name}" for name in COMMON}
 PROVENANCE = {
     "resolved_deck",
@@ -111,6 +130,7 @@ def test_axes_are_labelled_and_not_transposed(drive, tmp_path, engine):
             np.testing.assert_array_equal(data[f"{prefix}motion"], 1 + speed % 8 + 0 * where)
             assert (data[f"{prefix}status"] == 1).all()
             assert (data[f"{prefix}contact"] == 1).all()
+            np.testing.assert_array_equal(data[f"{prefix}reason"], 5 * (speed % 2 == 0) + 0 * where)
         np.testing.assert_array_equal(data.eta1, speed + 0 * place)
         np.testing.assert_array_equal(data.eta2, place // 1000)
 
@@ -215,6 +235,70 @@ def test_kill_between_writes_and_resume(drive, tmp_path, ranks):
     drive("verify", ranks=ranks, **size)
     assert (tmp_path / "map.h5").read_bytes() == uninterrupted
     assert [path.name for path in tmp_path.iterdir()] == ["map.h5"]
+
+
+@pytest.mark.parametrize("support", ["both", "flexible", "rigid"])
+def test_checksum_is_the_crc_of_the_other_values(drive, tmp_path, support):
+    drive("write", ranks=2, support=support)
+    with h5py.File(tmp_path / "map.h5") as file:
+        for prefix in ("", "rigid_"):
+            if f"{prefix}checksum" not in file:
+                continue
+            names = [prefix + name for name in COVERED if prefix + name in file]
+            checksums = file[f"{prefix}checksum"]
+            for point in np.ndindex(checksums.shape):
+                values = b"".join(file[name][point].tobytes() for name in names)
+                assert np.uint32(checksums[point].view(np.uint32)) == zlib.crc32(values)
+
+
+@pytest.mark.parametrize("ranks", [1, 3])
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("y1_rms", np.nextafter(3.125, 4.0)),
+        ("rigid_y1_max", np.nan),
+        ("eta_error", 1.0),
+        ("rigid_motion", 77),
+        ("status", 3),
+        ("status", 77),
+        ("reason", 1),
+        ("checksum", 0),
+    ],
+)
+def test_damaged_point_is_written_again(drive, tmp_path, name, value, ranks):
+    drive("write")
+    written = (tmp_path / "map.h5").read_bytes()
+    with h5py.File(tmp_path / "map.h5", "r+") as file:
+        place = (2,) if name.startswith("rigid") else (1, 2)
+        file[name][place] = value
+    damaged, sound = ("rigid", "flexible") if name.startswith("rigid") else ("flexible", "rigid")
+    done = drive("resume", ranks=ranks)
+    assert f"{damaged}: 1 point was damaged (checksum) and is computed again" in done.stdout
+    assert f"{sound}: \n" in done.stdout
+    assert (tmp_path / "map.h5").read_bytes() == written
+    assert "damaged" not in drive("verify", ranks=ranks).stdout
+
+
+def test_damaged_points_are_missing_at_once(drive, tmp_path):
+    """Opening the file is enough: whoever reads it next does not see damaged values."""
+    size = {"speeds": 70, "stiffnesses": 7}
+    drive("write", **size)
+    with h5py.File(tmp_path / "map.h5", "r+") as file:
+        file["y1_amplitude"][2:5, 10:20] *= 1.5
+        file["rigid_contact"][:] = 2
+    done = drive("verify", ranks=3, code=1, **size)
+    assert "flexible: 30 points were damaged (checksum) and are computed again" in done.stdout
+    assert "rigid: 70 points were damaged" in done.stdout
+    with xarray.open_dataset(tmp_path / "map.h5", engine="h5netcdf") as data:
+        missing = data.status == 0
+        assert missing.sum() == 30
+        assert (data.rigid_status == 0).all()
+        for name in (*REALS, *ETA):
+            assert data[name].isnull().equals(missing), name
+        for name in ("checksum", "motion", "contact", "reason", "periods_integrated"):
+            assert (data[name].values[missing.values] == 0).all(), name
+    drive("resume", ranks=2, **size)
+    drive("verify", **size)
 
 
 def test_another_deck_is_refused(drive, tmp_path):

@@ -7,12 +7,14 @@ program unit_tests
    use test_collocation, only: collect_collocation
    use test_contact, only: collect_contact
    use test_deck, only: collect_deck
+   use test_dense, only: collect_dense
    use test_equations, only: collect_equations
    use test_mesh, only: collect_mesh
    use test_motion, only: collect_motion
    use test_newmark, only: collect_newmark
    use test_paper_model, only: collect_paper_model
    use test_plan, only: collect_plan
+   use test_recorder, only: collect_recorder
    use test_results, only: collect_results
    use test_steady, only: collect_steady
    use test_modal, only: collect_modal
@@ -22,6 +24,7 @@ program unit_tests
    use test_search, only: collect_search
    use test_kahraman_singh, only: collect_kahraman_singh
    use test_lanes, only: collect_lanes
+   use test_spectrum, only: collect_spectrum
    use test_support, only: new_testsuite, run_testsuite, select_suite, testsuite_type
    use test_text, only: collect_text
    implicit none
@@ -42,6 +45,9 @@ program unit_tests
             new_testsuite('newmark', collect_newmark), &
             new_testsuite('collocation', collect_collocation), &
             new_testsuite('motion', collect_motion), &
+            new_testsuite('dense', collect_dense), &
+            new_testsuite('spectrum', collect_spectrum), &
+            new_testsuite('recorder', collect_recorder), &
             new_testsuite('plan', collect_plan), &
             new_testsuite('steady', collect_steady), &
             new_testsuite('modal', collect_modal), &

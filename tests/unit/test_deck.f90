@@ -8,8 +8,9 @@ module test_deck
    use spurflex_io_deck, only: parse_deck, read_deck
    use spurflex_io_number, only: read_integer, read_real
    use spurflex_io_reference, only: key_reference
-   use spurflex_io_schema, only: deck_groups, deck_keys, find_key, group_spec, key_spec
+   use spurflex_io_schema, only: deck_groups, deck_keys, find_key, group_spec, key_spec, words_of
    use spurflex_io_suggest, only: did_you_mean, nearest_name
+   use spurflex_measure_record, only: lines_of, observable_of, observables, record_request, records, samples_of
    use test_support, only: check, error_type, new_unittest, unittest_type
    implicit none
    private
@@ -44,6 +45,8 @@ contains
       testsuite = [ &
                   new_unittest('values in SI units', test_values), &
                   new_unittest('defaults', test_defaults), &
+                  new_unittest('what is recorded', test_records), &
+                  new_unittest('nothing is recorded unasked', test_no_records), &
                   new_unittest('a rigid support uses no gearbox', test_rigid), &
                   new_unittest('the resolved deck reads back to the same bits', test_resolved), &
                   new_unittest('ways to write a deck', test_spelling), &
@@ -131,6 +134,67 @@ contains
       if (allocated(error)) return
       call check(error, size(case%output%products), 0, 'products beside the map')
    end subroutine test_defaults
+
+   !> Products, quantities and extents, and all of it again from the resolved deck.
+   subroutine test_records(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      character(len=*), parameter :: output = '&output products = ''history'' ''spectrum'', quantities = ''thetam'', ''x2'''// &
+         newline//'highest_order = 2.5 spectrum_periods = 30, sections = 7 history_periods = 3 history_samples = 11 /'
+      type(case_type) :: case, again
+      type(library_error), allocatable :: fault
+
+      call parse_deck(problem//flexible_sweep//output, 'x.nml', case, fault)
+      call no_fault(error, fault)
+      if (allocated(error)) return
+      associate (record => case%output%record)
+         call check(error, record%spectrum .and. record%history .and. .not. record%section, 'products')
+         if (allocated(error)) return
+         call check(error, all(record%quantities == [observable_of('thetam'), observable_of('x2')]), 'quantities')
+         if (allocated(error)) return
+         call check(error, lines_of(record) == 76 .and. record%sections == 7 .and. samples_of(record) == 34, 'extents')
+         if (allocated(error)) return
+      end associate
+      call parse_deck(case%resolved, 'y.nml', again, fault)
+      call no_fault(error, fault)
+      if (allocated(error)) return
+      call check(error, again%resolved, case%resolved)
+      if (allocated(error)) return
+      call check(error, all(again%output%record%quantities == case%output%record%quantities) &
+                 .and. lines_of(again%output%record) == 76, 'resolved deck')
+   end subroutine test_records
+
+   !> The defaults are those of the request, and record nothing. Every observable quantity is a word of the deck.
+   subroutine test_no_records(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      type(case_type) :: case
+      type(library_error), allocatable :: fault
+      type(record_request) :: default
+      type(key_spec), allocatable :: keys(:)
+
+      call parse_deck(problem//rigid_sweep, 'x.nml', case, fault)
+      call no_fault(error, fault)
+      if (allocated(error)) return
+      associate (record => case%output%record)
+         call check(error, .not. records(record), 'nothing is recorded')
+         if (allocated(error)) return
+         call check(error, size(record%quantities) == 1 .and. record%quantities(1) == observable_of('y1'), 'y1')
+         if (allocated(error)) return
+         call check(error, lines_of(record) == lines_of(default) .and. record%sections == default%sections &
+                    .and. record%spectrum_periods == default%spectrum_periods .and. samples_of(record) == samples_of(default), &
+                    'extents')
+         if (allocated(error)) return
+      end associate
+      allocate (keys, source=deck_keys())
+      associate (words => words_of(keys(find_key(keys, 'output', 'quantities'))))
+         call check(error, size(words), size(observables))
+         if (allocated(error)) return
+         call check(error, all(words == observables%name), 'words')
+      end associate
+   end subroutine test_no_records
 
    !> A rigid support needs neither a gearbox nor support stiffnesses; if they are there they are checked but not used.
    subroutine test_rigid(error)

@@ -5,8 +5,9 @@ module test_plan
    use spurflex_base_text, only: to_text
    use spurflex_integrate_options, only: start_down, start_rest, start_static, start_up
    use spurflex_io_case, only: case_type
+   use spurflex_measure_record, only: observable_of
    use spurflex_measure_response, only: status_diverged, status_missing, status_not_settled, status_settled
-   use spurflex_sweep_plan, only: chunk_type, is_chained, plan_grid, plan_row
+   use spurflex_sweep_plan, only: chunk_type, describe_plan, is_chained, plan_grid, plan_row
    use test_support, only: check, error_type, new_unittest, unittest_type
    implicit none
    private
@@ -16,7 +17,7 @@ module test_plan
    integer, parameter :: done(3) = [status_settled, status_not_settled, status_diverged]
 
    !> Most points in a chunk that is not chained, and rows of a square tile of so many.
-   integer, parameter :: largest_chunk = 128, tallest_tile = 11
+   integer, parameter :: largest_chunk = 256, tallest_tile = 16
 
 contains
 
@@ -34,7 +35,8 @@ contains
                   new_unittest('softest support first', test_order), &
                   new_unittest('the rigid support is row 0', test_rigid), &
                   new_unittest('nothing is missing', test_nothing), &
-                  new_unittest('enough chunks for every rank', test_ranks) &
+                  new_unittest('enough chunks for every rank', test_ranks), &
+                  new_unittest('what is recorded and what is skipped', test_description) &
                   ]
    end subroutine collect_plan
 
@@ -344,5 +346,38 @@ contains
          end associate
       end do
    end subroutine test_ranks
+
+   !> The description names what is recorded, how large that is in the file, and what no product asks for.
+   subroutine test_description(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      type(case_type) :: case
+      character(len=:), allocatable :: text
+
+      case%solver%start = start_static
+      case%sweep%rigid = .true.
+      case%sweep%flexible = .true.
+      case%sweep%speed_count = 50
+      case%sweep%stiffness_count = 4
+      allocate (case%output%products(0))
+      case%output%record%quantities = [observable_of('y1'), observable_of('mesh_force')]
+      text = describe_plan(case)
+      call check(error, index(text, 'skipped: spectrum, Poincare section, history, which no product asks for') > 0, text)
+      if (allocated(error)) return
+      call check(error, index(text, 'recorded') == 0, text)
+      if (allocated(error)) return
+      case%output%record%spectrum = .true.
+      case%output%record%history = .true.
+      text = describe_plan(case)
+      call check(error, index(text, 'recorded of each point: y1 mesh_force'//new_line('a')) > 0, text)
+      if (allocated(error)) return
+      ! 250 points, 2 quantities: 3361 lines, and 2049 samples with their rates, of 8 bytes.
+      call check(error, index(text, '  spectrum: 3361 lines up to order 4.0, 1/840 apart; 13.4 MB in the file') > 0, text)
+      if (allocated(error)) return
+      call check(error, index(text, '  history: 8 mesh periods of 256 samples, with their rates; 16.4 MB in the file') > 0, text)
+      if (allocated(error)) return
+      call check(error, index(text, 'skipped: Poincare section, which no product asks for') > 0, text)
+   end subroutine test_description
 
 end module test_plan

@@ -105,6 +105,7 @@ contains
 
       type(solver_type) :: solver
       type(recorder_type) :: recorder
+      type(library_error), allocatable :: fault
       type(no_attendant) :: nobody
       real(wp) :: position(equations%n), velocity(equations%n)
 
@@ -114,7 +115,8 @@ contains
       call respond_one(solver, equations, position, velocity, nobody, answer)
       if (present(is_motion)) answer%motion = is_motion
       call new_recorder(options, request, recorder)
-      call recorder%record(equations, position, velocity, answer, record, nobody)
+      call recorder%record(equations, position, velocity, answer, record, fault, nobody)
+      if (allocated(fault)) error stop 'a motion cannot be recorded'
       call release_recorder(recorder)
    end subroutine record_point
 
@@ -665,7 +667,9 @@ contains
       start = [-3.0e-6_wp, 2.0e-6_wp, 5.0e-6_wp]
       rate = [0.01_wp, 0.0_wp, -0.02_wp]
       call new_recorder(free_options(), request, recorder)
-      call recorder%record(equations, start, rate, answer, record)
+      call recorder%record(equations, start, rate, answer, record, fault)
+      call check(error, .not. allocated(fault), 'recorded')
+      if (allocated(error)) return
       call release_recorder(recorder)
       call map%load(equations, 2*first_steps(equations), fault)
       call check(error, .not. allocated(fault), 'loaded')
@@ -724,7 +728,9 @@ contains
       call check(error, answer%motion, 1, 'the motion')
       if (allocated(error)) return
       call new_recorder(options, request, recorder)
-      call recorder%record(equations, position, velocity, answer, record)
+      call recorder%record(equations, position, velocity, answer, record, fault)
+      call check(error, .not. allocated(fault), 'recorded')
+      if (allocated(error)) return
       call release_recorder(recorder)
       call map%load(equations, steps, fault)
       call check(error, .not. allocated(fault), 'loaded')
@@ -753,6 +759,7 @@ contains
 
       type(solver_type) :: solver
       type(recorder_type) :: recorder
+      type(library_error), allocatable :: fault
       type(record_request) :: request
       type(record_type) :: record, shaken, far
       type(response) :: answer
@@ -768,12 +775,18 @@ contains
       call new_solver(free_options(), solver)
       call respond_one(solver, equations, position, velocity, nobody, answer)
       call new_recorder(free_options(), request, recorder)
-      call recorder%record(equations, position, velocity, answer, record)
-      call recorder%record(equations, 1.001_wp*position, 0.999_wp*velocity, answer, shaken)
+      call recorder%record(equations, position, velocity, answer, record, fault)
+      call check(error, .not. allocated(fault), 'recorded')
+      if (allocated(error)) return
+      call recorder%record(equations, 1.001_wp*position, 0.999_wp*velocity, answer, shaken, fault)
+      call check(error, .not. allocated(fault), 'recorded')
+      if (allocated(error)) return
       call check(error, maxval(abs(shaken%history(:, 1, 1) - record%history(:, 1, 1))), 0.0_wp, 1.0e-7_wp*answer%y1_amplitude, &
                  'closed')
       if (allocated(error)) return
-      call recorder%record(equations, 3.0_wp*position, -velocity, answer, far)
+      call recorder%record(equations, 3.0_wp*position, -velocity, answer, far, fault)
+      call check(error, .not. allocated(fault), 'recorded')
+      if (allocated(error)) return
       call release_recorder(recorder)
       call check(error, far%section(1, 1, 1), equations%static_observation(1) &
                  + 3.0_wp*dot_product(equations%observation(1, :), position), 1.0e-10_wp*answer%y1_amplitude, 'not closed')
@@ -785,6 +798,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       type(recorder_type) :: recorder
+      type(library_error), allocatable :: fault
       type(record_request) :: request
       type(record_type) :: record
       type(response) :: answer
@@ -800,7 +814,9 @@ contains
       do i = 1, 2
          answer%motion = 1
          answer%status = merge(status_missing, status_diverged, i == 1)
-         call recorder%record(equations, zero, zero, answer, record)
+         call recorder%record(equations, zero, zero, answer, record, fault)
+         call check(error, .not. allocated(fault), 'recorded')
+         if (allocated(error)) return
          call check(error, all(not_a_number(record%spectrum)), 'spectrum')
          if (allocated(error)) return
          call check(error, all(not_a_number(record%section)), 'section')
@@ -871,6 +887,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       type(recorder_type) :: recorder
+      type(library_error), allocatable :: fault
       type(solver_type) :: solver
       type(record_request) :: request
       type(record_type) :: record, fresh
@@ -895,7 +912,9 @@ contains
             position = spread(0.0_wp, 1, equations(i)%n)
             velocity = position
             call respond_one(solver, equations(i), position, velocity, nobody, answer)
-            call recorder%record(equations(i), position, velocity, answer, record)
+            call recorder%record(equations(i), position, velocity, answer, record, fault)
+            call check(error, .not. allocated(fault), 'recorded')
+            if (allocated(error)) return
             call record_fresh()
             call check(error, all(same(record%spectrum, fresh%spectrum)), &
                        'spectrum of point '//to_text(i))
@@ -915,9 +934,11 @@ contains
       !> The record of the point by a new recorder.
       subroutine record_fresh()
          type(recorder_type) :: new
+         type(library_error), allocatable :: fault
 
          call new_recorder(free_options(), request, new)
-         call new%record(equations(i), position, velocity, answer, fresh)
+         call new%record(equations(i), position, velocity, answer, fresh, fault)
+         if (allocated(fault)) error stop 'a motion cannot be recorded'
          call release_recorder(new)
       end subroutine record_fresh
 

@@ -1,14 +1,20 @@
 !> What a result file is made of, without the file: axes, the table of variables, dates, decks compared, the lock.
 module test_results
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
+   use spurflex_base_checksum, only: extended, extended_over
    use spurflex_base_error, only: exit_mismatch, fault => error_type
-   use spurflex_base_kinds, only: i8, wp
+   use spurflex_base_kinds, only: i4, i8, wp
    use spurflex_external_file_lock, only: acquire_lock, file_lock, release_lock
    use spurflex_io_axes, only: speeds, stiffnesses
    use spurflex_io_case, only: sweep_spec
    use spurflex_io_deck_difference, only: deck_difference
    use spurflex_io_provenance, only: iso_date
-   use spurflex_io_results_layout, only: axes_of, axis_type, flags_of, flexible_variables, get_values, real_value, &
-      rigid_variables, set_values, variable_type
+   use spurflex_io_record_layout, only: get_record, record_axes, record_bytes, record_history, record_section, &
+      record_spectrum, record_variables
+   use spurflex_io_results_failures, only: reason_sentence
+   use spurflex_io_results_layout, only: axes_of, axis_type, checksum_quantity, flags_of, flexible_variables, get_values, &
+      real_value, reason_flag, rigid_variables, set_values, variable_type
+   use spurflex_measure_record, only: observable_of, record_request, record_type
    use spurflex_measure_response, only: empty_response, response
    use test_support, only: check, error_type, new_unittest, unittest_type
    implicit none
@@ -36,6 +42,12 @@ contains
                   new_unittest('the status is written last', test_status_last), &
                   new_unittest('every quantity has its values', test_values), &
                   new_unittest('every flag has a word', test_flags), &
+                  new_unittest('every reason has a sentence', test_reasons), &
+                  new_unittest('checksums of known bytes', test_checksums), &
+                  new_unittest('what is not asked for has no variable', test_no_records), &
+                  new_unittest('variables of records', test_record_variables), &
+                  new_unittest('axes of records', test_record_axes), &
+                  new_unittest('values of records', test_record_values), &
                   new_unittest('dates', test_dates), &
                   new_unittest('equal decks do not differ', test_equal_decks), &
                   new_unittest('differing decks are told apart by key', test_differing_decks), &
@@ -156,10 +168,11 @@ contains
 
       character(len=*), parameter :: before_eta = 'y1_amplitude y1_rms y1_max y1_min bearing1_deformation_max ' &
          //'bearing2_deformation_max '
-      character(len=*), parameter :: behind_eta = 'error_estimate motion periods_integrated contact status '
+      character(len=*), parameter :: behind_eta = 'error_estimate motion periods_integrated contact reason checksum ' &
+         //'status '
       character(len=*), parameter :: rigid_names = 'rigid_y1_amplitude rigid_y1_rms rigid_y1_max rigid_y1_min ' &
          //'rigid_bearing1_deformation_max rigid_bearing2_deformation_max rigid_error_estimate rigid_motion ' &
-         //'rigid_periods_integrated rigid_contact rigid_status '
+         //'rigid_periods_integrated rigid_contact rigid_reason rigid_checksum rigid_status '
 
       call check(error, names_of(flexible_variables(grid_of(rigid=.true., flexible=.true.))), &
          before_eta//'eta1 eta2 eta_error '//behind_eta)
@@ -205,6 +218,9 @@ contains
             call get_values(quantity, responses, eta, reals, integers)
             if (index(quantity, 'eta') == 1) then
                call check(error, reals(1) >= 0.0_wp, quantity)
+            else if (quantity == checksum_quantity) then
+               ! It follows from the others.
+               call check(error, integers(1), nint(unset), quantity)
             else if (variables(i)%kind == real_value) then
                call check(error, nint(reals(1)), i, quantity)
             else
@@ -233,6 +249,187 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_flags
+
+   !> No two reasons read the same, and none is unknown.
+   subroutine test_reasons(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer, allocatable :: values(:)
+      character(len=:), allocatable :: meanings
+      integer :: i, j
+
+      call flags_of(reason_flag, values, meanings)
+      do i = 1, size(values)
+         do j = 1, i - 1
+            call check(error, reason_sentence(values(i)) /= reason_sentence(values(j)), reason_sentence(values(i)))
+            if (allocated(error)) return
+         end do
+      end do
+      call check(error, reason_sentence(0), reason_sentence(maxval(values) + 1))
+   end subroutine test_reasons
+
+   !> Known answers, by zlib: of '1234', '12345678', the next eight zeros, and 1.0 behind '1234'.
+   subroutine test_checksums(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer(i8), parameter :: digits = int(z'3837363534333231', i8)
+      integer(i4), parameter :: four = int(z'34333231', i4)
+      integer(i4), parameter :: crc_four = not(int(z'641C1F5C', i4)), crc_eight = not(int(z'651F2550', i4))
+      real(wp), parameter :: numbers(5) = [1.0_wp, -2.5_wp, 0.0_wp, huge(1.0_wp), tiny(1.0_wp)]
+      integer(i4) :: one_by_one
+      integer :: n
+
+      call check(error, extended(0_i4, four), crc_four, 'four bytes')
+      if (allocated(error)) return
+      call check(error, extended(0_i4, transfer(digits, 1.0_wp)), crc_eight, 'eight bytes')
+      if (allocated(error)) return
+      call check(error, extended(extended(0_i4, four), int(z'38373635', i4)), crc_eight, 'four bytes twice')
+      if (allocated(error)) return
+      call check(error, extended(crc_eight, 0.0_wp), not(int(z'6BF1AD8E', i4)), 'eight zeros behind them')
+      if (allocated(error)) return
+      call check(error, extended(crc_four, 1.0_wp), not(int(z'2963D543', i4)), 'a real behind an integer')
+      if (allocated(error)) return
+      call check(error, extended(0_i4, 1.0_wp) /= extended(0_i4, nearest(1.0_wp, 2.0_wp)), 'the last bit counts')
+      if (allocated(error)) return
+      one_by_one = crc_four
+      call check(error, extended_over(crc_four, numbers(:0)), crc_four, 'nothing more')
+      if (allocated(error)) return
+      do n = 1, size(numbers)
+         one_by_one = extended(one_by_one, numbers(n))
+         call check(error, extended_over(crc_four, numbers(:n)), one_by_one, 'several at once')
+         if (allocated(error)) return
+      end do
+   end subroutine test_checksums
+
+   !> Only products that are asked for have axes and variables, and only where the support is there.
+   subroutine test_no_records(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer :: kind
+
+      associate (grid => grid_of(rigid=.true., flexible=.true.))
+         call check(error, size(record_axes(request_of())), 0, 'axes')
+         if (allocated(error)) return
+         do kind = record_spectrum, record_history
+            call check(error, size(record_variables(grid, request_of(), kind, rigid=.true.)), 0, 'variables')
+            if (allocated(error)) return
+            call check(error, record_bytes(grid, request_of(), kind) <= 0.0_wp, 'bytes')
+            if (allocated(error)) return
+         end do
+         call check(error, names_of(record_variables(grid, request_of(spectrum=.true.), record_section, rigid=.false.)), '')
+         if (allocated(error)) return
+      end associate
+      call check(error, names_of(record_variables(grid_of(rigid=.false., flexible=.true.), request_of(spectrum=.true.), &
+                                                  record_spectrum, rigid=.true.)), '')
+   end subroutine test_no_records
+
+   !> The names are those that scripts rely on; a gearbox on a rigid support does not move.
+   subroutine test_record_variables(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      type(variable_type), allocatable :: variables(:)
+      type(record_request) :: request
+
+      request = request_of(.true., .true., .true.)
+      associate (grid => grid_of(rigid=.true., flexible=.true.))
+         call check(error, names_of(record_variables(grid, request, record_spectrum, rigid=.false.)), &
+                    'spectrum spectrum_xm spectrum_mesh_force ')
+         if (allocated(error)) return
+         call check(error, names_of(record_variables(grid, request, record_section, rigid=.false.)), &
+                    'poincare poincare_rate poincare_xm poincare_xm_rate poincare_mesh_force poincare_mesh_force_rate ')
+         if (allocated(error)) return
+         call check(error, names_of(record_variables(grid, request, record_history, rigid=.true.)), &
+                    'history/rigid_y1 history/rigid_y1_rate history/rigid_mesh_force history/rigid_mesh_force_rate ')
+         if (allocated(error)) return
+         allocate (variables, source=record_variables(grid, request, record_section, rigid=.true.))
+      end associate
+      call check(error, names_of(variables), &
+                 'rigid_poincare rigid_poincare_rate rigid_poincare_mesh_force rigid_poincare_mesh_force_rate ')
+      if (allocated(error)) return
+      call check(error, trim(variables(3)%units)//' '//trim(variables(4)%units), 'N N/s')
+      if (allocated(error)) return
+      call check(error, trim(variables(3)%axes(1))//' '//trim(variables(3)%axes(2))//trim(variables(3)%axes(3)), 'section speed')
+      if (allocated(error)) return
+      call check(error, index(variables(4)%long_name, 'rigid support: Poincare section of the rate of the mesh force') == 1, &
+                 variables(4)%long_name)
+   end subroutine test_record_variables
+
+   !> Orders from the mean to the highest, sections from 1, times in mesh periods with both ends.
+   subroutine test_record_axes(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      type(axis_type), allocatable :: axes(:)
+
+      allocate (axes, source=record_axes(request_of(.true., .true., .true.)))
+      call check(error, size(axes), 3)
+      if (allocated(error)) return
+      call check(error, trim(axes(1)%name)//' '//trim(axes(2)%name)//' '//trim(axes(3)%group)//trim(axes(3)%name), &
+                 'order section history/mesh_time')
+      if (allocated(error)) return
+      call check(error, all(abs(axes(1)%values - [0.0_wp, 0.25_wp, 0.5_wp, 0.75_wp, 1.0_wp, 1.25_wp, 1.5_wp]) <= 0.0_wp), 'order')
+      if (allocated(error)) return
+      call check(error, all(abs(axes(2)%values - [1.0_wp, 2.0_wp, 3.0_wp]) <= 0.0_wp), 'section')
+      if (allocated(error)) return
+      call check(error, all(abs(axes(3)%values - [0.0_wp, 0.5_wp, 1.0_wp, 1.5_wp, 2.0_wp]) <= 0.0_wp), 'time')
+   end subroutine test_record_axes
+
+   !> Each variable is its part of a record; NaN without one. The bytes are those of all variables.
+   subroutine test_record_values(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      type(record_type) :: record, nothing
+      type(variable_type), allocatable :: variables(:)
+      type(record_request) :: request
+      real(wp) :: values(3)
+      integer :: i, k
+
+      request = request_of(.true., .true., .true.)
+      associate (grid => grid_of(rigid=.true., flexible=.true.))
+         record%section = reshape([(real(i, wp), i=1, 18)], [3, 2, 3])
+         allocate (variables, source=[record_variables(grid, request, record_section, rigid=.false.), &
+                                      record_variables(grid, request, record_section, rigid=.true.)])
+         do k = 1, size(variables)
+            call get_record(record, variables(k), values)
+            ! The gearbox, second of the quantities, is left out on the rigid support.
+            i = 3*(merge(k, merge(k - 6, k - 4, k < 9), k < 7) - 1)
+            call check(error, all(abs(values - [i + 1, i + 2, i + 3]) <= 0.0_wp), variables(k)%name)
+            if (allocated(error)) return
+            call get_record(nothing, variables(k), values)
+            call check(error, all(ieee_is_nan(values)), 'nothing recorded')
+            if (allocated(error)) return
+         end do
+         ! 5 speeds; 3 stiffnesses with 3 quantities and the rigid support with 2; 7 lines, 2*3 sections, 2*5 samples.
+         call check(error, nint(record_bytes(grid, request, record_spectrum)), 8*5*7*(3*3 + 2), 'spectrum')
+         if (allocated(error)) return
+         call check(error, nint(record_bytes(grid, request, record_section)), 8*5*6*(3*3 + 2), 'section')
+         if (allocated(error)) return
+         call check(error, nint(record_bytes(grid, request, record_history)), 8*5*10*(3*3 + 2), 'history')
+      end associate
+   end subroutine test_record_values
+
+   !> Small records of three quantities.
+   pure function request_of(spectrum, section, history) result(request)
+      !> Whether each product is asked for; not if absent.
+      logical, intent(in), optional :: spectrum, section, history
+      !> The request: 7 lines, 3 sections, 5 samples.
+      type(record_request) :: request
+
+      request%quantities = [observable_of('y1'), observable_of('xm'), observable_of('mesh_force')]
+      request%highest_order = 1.5_wp
+      request%spectrum_periods = 4
+      request%sections = 3
+      request%history_periods = 2
+      request%history_samples = 2
+      if (present(spectrum)) request%spectrum = spectrum
+      if (present(section)) request%section = section
+      if (present(history)) request%history = history
+   end function request_of
 
    !> Leap days, ends of years, the start of the count.
    subroutine test_dates(error)

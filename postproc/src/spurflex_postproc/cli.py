@@ -10,6 +10,7 @@ from spurflex_postproc.figures import FIGURES, Options
 from spurflex_postproc.figures.common import PAPER_STIFFNESS
 from spurflex_postproc.layout import ResultError
 from spurflex_postproc.output import save
+from spurflex_postproc.quantities import QUANTITIES
 from spurflex_postproc.reading import coverage, open_result, require
 
 COMPLETE, FAILED, UNUSABLE = 0, 1, 2
@@ -35,7 +36,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error("name a figure and a result file, or --list")
     if len(chosen.result) > 1 and not FIGURES[chosen.figure].several:
         parser.error(f"figure {chosen.figure} is drawn from one result file")
-    options = Options(stiffness=chosen.stiffness, mesh_axis=chosen.mesh_axis)
+    options = Options(
+        stiffness=chosen.stiffness,
+        mesh_axis=chosen.mesh_axis,
+        speed=chosen.speed,
+        quantity=chosen.quantity,
+        rigid=chosen.rigid,
+        log=chosen.log,
+    )
     try:
         _draw(chosen.figure, chosen.result, chosen.output, options)
     except ResultError as error:
@@ -58,7 +66,7 @@ def _draw(number: str, paths: Sequence[Path], folder: Path, options: Options) ->
     for result, path in zip(results, paths, strict=True):
         require(result, entry.needs)
         for support, name in (("flexible", "status"), ("rigid", "rigid_status")):
-            if name in entry.needs:
+            if name in (entry.needs or result):
                 print(f"{path}, {support} support: {coverage(result, support)}")
     for drawing in entry.draw(results if entry.several else results[0], options):
         if drawing.report:
@@ -84,7 +92,26 @@ def _parser() -> argparse.ArgumentParser:
         type=_positive,
         default=PAPER_STIFFNESS,
         metavar="N/M",
-        help="figure 2: take the row nearest to this support stiffness (default: %(default)g)",
+        help="take the row nearest to this support stiffness (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--speed",
+        type=_positive,
+        metavar="REV/MIN",
+        help="figures 4 to 8, point: take the point nearest to this speed",
+    )
+    parser.add_argument(
+        "--quantity",
+        choices=list(QUANTITIES),
+        default="y1",
+        metavar="NAME",
+        help=f"what was recorded: {', '.join(QUANTITIES)} (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--rigid", action="store_true", help="figures 4 to 8, point: the rigid support"
+    )
+    parser.add_argument(
+        "--log", action="store_true", help="figures 4 to 8, point: logarithmic spectrum"
     )
     parser.add_argument(
         "--mesh-axis", action="store_true", help="figure 2: mesh frequency as a second axis"

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import h5py
 
-from spurflex_postproc.layout import ResultError, plain_text
+from spurflex_postproc.guard import rehearse
+from spurflex_postproc.layout import plain_text, reading
 
 
 def deck_values(path: str | Path) -> dict[str, str]:
@@ -20,14 +21,17 @@ def deck_values(path: str | Path) -> dict[str, str]:
     Raises:
         ResultError: If the file cannot be read.
     """
-    try:
-        with h5py.File(path, "r") as file:
-            group = file.get("provenance", {})
-            text = str(plain_text(group["resolved_deck"][()])) if "resolved_deck" in group else ""
-    except OSError as cause:
-        raise ResultError(f"{path}: cannot be read") from cause
-    pairs = re.findall(r"^\s*(\w+)\s*=\s*(.*?)\s*$", text, re.MULTILINE)
+    path = Path(path)
+    rehearse(path, _resolved_deck)
+    pairs = re.findall(r"^\s*(\w+)\s*=\s*(.*?)\s*$", _resolved_deck(path), re.MULTILINE)
     return dict(pairs)
+
+
+def _resolved_deck(path: Path) -> str:
+    """Read the text of the resolved deck; '' if the file holds none."""
+    with reading(path), h5py.File(path, "r") as file:
+        group = file.get("provenance", {})
+        return str(plain_text(group["resolved_deck"][()])) if "resolved_deck" in group else ""
 
 
 def start_of(path: str | Path) -> str:

@@ -62,3 +62,17 @@ def is_regular(status: ArrayLike, motion: ArrayLike) -> NDArray[np.bool_]:
     periodic = ((motion >= 1) & (motion <= LARGEST_PERIOD)) | (motion > LONG_PERIOD)
     settled_unknown = (motion == Motion.UNRESOLVED) & (status == Status.SETTLED)
     return np.asarray(has_value(status) & (periodic | settled_unknown))
+
+
+def period_of(flag: int) -> int | None:
+    """Return the mesh periods after which a motion repeats; None if it does not.
+
+    Args:
+        flag: A flag of `motion`.
+
+    Returns:
+        The multiple of the mesh period.
+    """
+    if 1 <= flag <= LARGEST_PERIOD:
+        return flag
+    return flag - LONG_PERIOD if flag > LONG_PERIOD else None

@@ -1,6 +1,8 @@
 """Checks the layout of a result file before anything is read from it."""
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import h5py
@@ -10,11 +12,16 @@ SPEED = "speed"
 STIFFNESS = "support_stiffness"
 GRID = (STIFFNESS, SPEED)
 UNITS = {"speed": ("rpm", "rev/min"), "support_stiffness": ("N/m",)}
+MOST_VALUES = 1_000_000
+"""Most values of an axis that a deck allows."""
 METRES = re.compile(r"(rigid_)?(y1_(amplitude|rms|max|min)|bearing[12]_deformation_max)")
 ON_GRID = re.compile(
     r"y1_(amplitude|rms|max|min)|bearing[12]_deformation_max|eta[12]|motion|status|contact"
     r"|periods_integrated|error_estimate|floquet_magnitude|lyapunov_exponent"
 )
+RECORDED = re.compile(r"(?P<rigid>rigid_)?(?P<product>spectrum|poincare)(_\w+)?")
+RECORDED_ON = {"spectrum": "order", "poincare": "section"}
+"""Dimension of each recorded product behind the grid."""
 
 
 class ResultError(Exception):
@@ -37,7 +44,9 @@ def check_file(path: Path) -> int | None:
         raise ResultError(f"{path}: no such file")
     if path.is_dir():
         raise ResultError(f"{path}: is a folder, not a result file")
-    try:
+    if not path.is_file():
+        raise ResultError(f"{path}: is not a regular file")
+    with reading(path):
         with path.open("rb") as stream:
             empty = not stream.read(1)
         if empty:
@@ -51,10 +60,27 @@ def check_file(path: Path) -> int | None:
                     _check_variable(path, name, item)
             _check_supports(path, file)
             return _teeth(file)
+
+
+@contextmanager
+def reading(path: str | Path) -> Iterator[None]:
+    """Turn whatever reading a damaged file raises into one line for the user.
+
+    Args:
+        path: The file.
+
+    Raises:
+        ResultError: Saying what is wrong with it.
+    """
+    try:
+        yield
+    except ResultError:
+        raise
     except PermissionError as cause:
         raise ResultError(f"{path}: permission denied") from cause
-    except (OSError, RuntimeError, KeyError) as cause:
-        raise ResultError(f"{path}: {_diagnosis(str(cause))}") from cause
+    # Damage shows as anything: types that do not exist, text that is none, impossible sizes.
+    except Exception as cause:
+        raise ResultError(f"{path}: {_diagnosis(str(cause) or type(cause).__name__)}") from cause
 
 
 def _check_axes(path: Path, file: h5py.File) -> None:
@@ -67,6 +93,8 @@ def _check_axes(path: Path, file: h5py.File) -> None:
             raise ResultError(f"{path}: is not a spurflex result file (no '{name}' axis)")
         if axis.ndim != 1 or axis.dtype.kind not in "fi":
             raise ResultError(f"{path}: '{name}' is not a list of numbers")
+        if axis.size > MOST_VALUES:
+            raise ResultError(f"{path}: damaged: '{name}' has {axis.size} values")
         values = axis[:]
         if not values.size and name == STIFFNESS:
             continue
@@ -81,7 +109,8 @@ def _check_variable(path: Path, name: str, item: h5py.Dataset) -> None:
     if not all(len(dimension) for dimension in item.dims):
         raise ResultError(f"{path}: '{name}' has a dimension without scale")
     scales = [dimension[0] for dimension in item.dims]
-    names = tuple(scale.name.lstrip("/") for scale in scales)
+    # A scale that a group shares goes by either of its names.
+    names = tuple(scale.name.rpartition("/")[2] for scale in scales)
     if names == (name,):
         return
     expected: tuple[str, ...] | None = None
@@ -89,6 +118,9 @@ def _check_variable(path: Path, name: str, item: h5py.Dataset) -> None:
         expected = GRID
     elif ON_GRID.fullmatch(name.removeprefix("rigid_")):
         expected = (SPEED,)
+    elif found := RECORDED.fullmatch(name):
+        grid = (SPEED,) if found["rigid"] else GRID
+        expected = (*grid, RECORDED_ON[found["product"]])
     if expected and names != expected:
         raise ResultError(
             f"{path}: '{name}' is on ({', '.join(names)}), expected ({', '.join(expected)})"
@@ -149,7 +181,7 @@ def _diagnosis(message: str) -> str:
     """Say in the user's words why HDF5 could not open or read a file."""
     if "truncated" in message:
         return "is truncated (an interrupted copy, or a full disk)"
-    if "lock" in message:
+    if "unable to lock" in message:
         return "is locked by a run that is still writing it"
     return f"damaged: {one_line(message)}"
 

@@ -4,11 +4,24 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+import h5py
 import numpy as np
 import xarray as xr
 
 from spurflex_postproc.flags import NO_VALUE, Status, has_value
-from spurflex_postproc.layout import SPEED, ResultError, check_file, one_line, plain_text
+from spurflex_postproc.guard import rehearse
+from spurflex_postproc.layout import (
+    GRID,
+    ON_GRID,
+    SPEED,
+    ResultError,
+    check_file,
+    plain_text,
+    reading,
+)
+
+LARGEST = 1e30
+"""Beyond anything that a result can hold, in any of its units."""
 
 
 @dataclass(frozen=True)
@@ -46,26 +59,51 @@ def open_result(path: str | Path) -> xr.Dataset:
         path: The HDF5 file that a run wrote.
 
     Returns:
-        The variables at the root of the file, on the dimensions `speed` [rev/min] and
-        `support_stiffness` [N/m]. Where a point is missing or diverged, reals are NaN and
-        integers are `NO_VALUE`; `status` and `rigid_status` stay as they are. The attribute
-        `path` names the file, `teeth_1` the teeth of the driving gear if the file tells.
+        The variables at the root of the file on the dimensions `speed` [rev/min] and
+        `support_stiffness` [N/m]; what has more dimensions stays in the file, for
+        `spurflex_postproc.recordings` or xarray itself. Where a point is missing or diverged,
+        reals are NaN and integers are `NO_VALUE`; `status` and `rigid_status` stay as they are.
+        The attribute `path` names the file, `teeth_1` the teeth of the driving gear if the file
+        tells.
 
     Raises:
         ResultError: If the file is missing, damaged, foreign or lacks required parts.
     """
     path = Path(path)
+    rehearse(path, _read_all)
+    return _read(path)
+
+
+def _read_all(path: Path) -> None:
+    """Read what any figure may ask of a file, but not the recorded values themselves."""
+    _read(path)
+    with h5py.File(path, "r") as file:
+        file.visititems(_touch)
+
+
+def _touch(name: str, item: h5py.Dataset | h5py.Group) -> None:
+    """Read attributes and dimension scales."""
+    dict(item.attrs)
+    if isinstance(item, h5py.Dataset):
+        for dimension in item.dims:
+            for scale in dimension.values():
+                scale.shape  # noqa: B018
+
+
+def _read(path: Path) -> xr.Dataset:
+    """Read a result file; as `open_result`."""
     teeth = check_file(path)
-    try:
+    with reading(path):
         with xr.open_dataset(path, engine="h5netcdf", decode_cf=False) as lazy:
-            result = lazy.load()
-    except (OSError, RuntimeError, ValueError, KeyError) as cause:
-        raise ResultError(f"{path}: damaged: {one_line(cause)}") from cause
-    # Without decoding, dimension scales are plain variables on some versions of xarray.
-    result = result.set_coords([name for name in result.dims if name in result.variables])
-    for variable in result.variables.values():
-        variable.attrs = {key: plain_text(value) for key, value in variable.attrs.items()}
-    result = _masked(result)
+            further = [name for name in lazy.variables if not set(lazy[name].dims) <= set(GRID)]
+            result = lazy.drop_vars(further).load()
+        # Without decoding, dimension scales are plain variables on some versions of xarray.
+        result = result.set_coords([name for name in result.dims if name in result.variables])
+        for variable in result.variables.values():
+            variable.attrs = {key: plain_text(value) for key, value in variable.attrs.items()}
+        _check_flags(path, result)
+        result = _masked(result)
+        _check_numbers(path, result)
     result.attrs["path"] = str(path)
     if teeth is not None:
         result.attrs["teeth_1"] = teeth
@@ -110,6 +148,28 @@ def require(result: xr.Dataset, names: Iterable[str]) -> None:
     elif not any(name in result for name in ("status", "y1_amplitude")):
         hint = " (run with support = 'both' or 'flexible')"
     raise ResultError(f"{result.attrs.get('path', 'result')}: lacks {', '.join(absent)}{hint}")
+
+
+def _check_flags(path: Path, result: xr.Dataset) -> None:
+    """Refuse variables that hold no numbers, and flags that do not exist."""
+    for name, data in result.data_vars.items():
+        if ON_GRID.fullmatch(str(name).removeprefix("rigid_")) and data.dtype.kind not in "fiu":
+            raise ResultError(f"{path}: '{name}' does not hold numbers")
+        if name in ("status", "rigid_status") and not np.isin(data, list(Status)).all():
+            raise ResultError(f"{path}: damaged: '{name}' holds a flag that does not exist")
+
+
+def _check_numbers(path: Path, result: xr.Dataset) -> None:
+    """Refuse numbers that no computation leaves behind where a point has values.
+
+    An estimate of an error may be infinite: nothing is known then.
+    """
+    for name, data in result.data_vars.items():
+        estimate = str(name).endswith(("_error", "error_estimate"))
+        if data.dtype.kind == "f" and np.any(
+            (np.abs(data) > LARGEST) & ~(estimate & np.isposinf(data))
+        ):
+            raise ResultError(f"{path}: damaged: '{name}' holds impossible numbers")
 
 
 def _masked(result: xr.Dataset) -> xr.Dataset:

@@ -11,10 +11,15 @@ from typing import Any
 from spurflex_postproc.figures import (
     amplitude_curves,
     bearing_deformation,
+    bifurcation,
+    motion_over_speed,
+    one_motion,
     starts,
     stiffness_map,
+    waterfall,
 )
 from spurflex_postproc.figures.common import Drawing, Options
+from spurflex_postproc.published import published_points
 
 
 @dataclass(frozen=True)
@@ -23,7 +28,8 @@ class Entry:
 
     Attributes:
         title: What it shows, in one line.
-        needs: Variables that the result file must hold.
+        needs: Variables that the result file must hold; what was recorded is looked for when
+            it is drawn.
         draw: Makes the drawings from one dataset, or from a list of them if `several`; raises
             `ResultError` if the data do not allow it.
         several: Whether it is drawn from several result files.
@@ -41,6 +47,19 @@ FIGURES: dict[str, Entry] = {
         amplitude_curves.NEEDS,
         amplitude_curves.draw,
     ),
+    "3": Entry(
+        "waterfalls and bifurcation diagrams of the driving gear, flexible and rigid support",
+        motion_over_speed.NEEDS,
+        motion_over_speed.draw,
+    ),
+    **{
+        point.figure: Entry(
+            f"time history, spectrum, phase plane, Poincare map at {point.speed:.0f} rev/min",
+            (),
+            one_motion.published_figure(point.figure),
+        )
+        for point in published_points()
+    },
     "9": Entry(
         "amplitude over rotating speed and support stiffness, as a map and as a surface",
         stiffness_map.NEEDS,
@@ -56,6 +75,13 @@ FIGURES: dict[str, Entry] = {
         starts.NEEDS,
         starts.draw,
         several=True,
+    ),
+    "waterfall": Entry("spectra over the speed, as a stack and as a map", (), waterfall.draw),
+    "bifurcation": Entry("Poincare sections over the speed", (), bifurcation.draw),
+    "point": Entry(
+        "time history, spectrum, phase plane, Poincare map of any point (--speed)",
+        (),
+        one_motion.draw,
     ),
 }
 

@@ -1,5 +1,7 @@
 """Figure 10: bearing deformation of the driving gear and its change by the flexible support."""
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -75,7 +77,8 @@ def draw(result: xr.Dataset, options: Options) -> list[Drawing]:
     border = stiff_border(stiffness, eta, near_zero=NEAR_ZERO)
 
     figure = Figure(figsize=style.size(style.DOUBLE, 150), layout="constrained")
-    upper, lower = figure.subfigures(2, 1, height_ratios=[0.8, 1.0])
+    halves: Any = figure.subfigures(2, 1, height_ratios=[0.8, 1.0])
+    upper, lower = halves
     left, right = upper.subplots(1, 2)
     _curve(left, speed, rigid, regular)
     _deformation(upper, right, speed, stiffness, deformation)

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from spurflex_postproc import style
 from spurflex_postproc.figures.scale import edges
 from spurflex_postproc.flags import LARGEST_PERIOD, LONG_PERIOD, NO_VALUE, Motion
+from spurflex_postproc.published import published_regimes
 
 LONGER_PERIODS = (*range(4, LARGEST_PERIOD + 1), *range(LONG_PERIOD, 2 * LONG_PERIOD))
 """Flags of the periods that share a class."""
@@ -22,12 +23,15 @@ CLASSES: tuple[tuple[str, str, tuple[int, ...]], ...] = (
     ("2T", style.SKY_BLUE, (2,)),
     ("3T", style.NAVY, (3,)),
     ("4T and more", style.GREEN, LONGER_PERIODS),
-    ("quasi-periodic", style.YELLOW, (Motion.QUASI_PERIODIC,)),
+    ("quasi-periodic", style.ORANGE, (Motion.QUASI_PERIODIC,)),
     ("chaotic", style.PURPLE, (Motion.CHAOTIC,)),
     ("unresolved", style.BLACK, (Motion.UNRESOLVED,)),
     ("no value", "white", (NO_VALUE,)),
 )
 """Name, colour and flags of each class. T is the mesh period."""
+
+LINES = {"1T": style.GREY}
+"""Colours of lines and dots where that of a class is too pale for them."""
 
 HEIGHT = 0.7
 """Height of a row, as a fraction of the distance of the rows."""
@@ -48,6 +52,40 @@ def motion_class(motion: ArrayLike) -> NDArray[np.int64]:
     for at, (_, _, members) in enumerate(CLASSES):
         found[np.isin(flags, members)] = at
     return found
+
+
+def line_colour(flag: int) -> str:
+    """Return the colour of a line or a dot for a motion flag."""
+    name, colour, _ = CLASSES[int(motion_class(flag))]
+    return LINES.get(name, colour)
+
+
+def line_legend(flags: ArrayLike) -> list[Artist]:
+    """Return legend entries for the classes that occur among motion flags."""
+    names = [(CLASSES[at][0], CLASSES[at][1]) for at in np.unique(motion_class(flags))]
+    return [
+        Line2D([], [], color=LINES.get(name, colour), lw=1.5, label=name)
+        for name, colour in names
+        if name != "no value"
+    ]
+
+
+def published_motion(support: str, speed: ArrayLike) -> NDArray[np.int64]:
+    """Return the published motion as flags.
+
+    Args:
+        support: 'rigid' or 'flexible'.
+        speed: Rotating speeds [rev/min], shape (n,).
+
+    Returns:
+        The flags, `NO_VALUE` outside the published range, shape (n,).
+    """
+    x = np.asarray(speed, dtype=float)
+    flags = np.full(x.shape, NO_VALUE, dtype=np.int64)
+    for at, (name, first, last) in enumerate(published_regimes(support)):
+        flag = int(Motion.CHAOTIC) if name == "chaotic" else int(name[:-1])
+        flags[(x > first) & (x <= last) | (x == first) & (at == 0)] = flag
+    return flags
 
 
 def draw_motion(axes: Axes, speed: ArrayLike, rows: Mapping[str, ArrayLike]) -> None:

@@ -17,13 +17,17 @@ from spurflex_postproc.figures.common import (
     SPEED_LABEL,
     Drawing,
     Options,
+    legend_below,
     nearest_row,
     require_values,
 )
-from spurflex_postproc.figures.motion_strip import CLASSES, draw_motion, motion_class
-from spurflex_postproc.flags import Motion
+from spurflex_postproc.figures.motion_strip import (
+    CLASSES,
+    draw_motion,
+    motion_class,
+    published_motion,
+)
 from spurflex_postproc.layout import SPEED, STIFFNESS, ResultError
-from spurflex_postproc.published import published_regimes
 
 NEEDS = (
     *("y1_amplitude", "status", "motion"),
@@ -79,7 +83,7 @@ def draw(results: Sequence[xr.Dataset], options: Options) -> list[Drawing]:
         _amplitudes(upper, speed[inside], amplitude)
         upper.set_title(f"{'ab'[column]}  {support} support", loc="left", fontweight="bold")
         rows = {
-            "published": _published(support, speed[inside]),
+            "published": published_motion(support, speed[inside]),
             **{f"start '{start}'": flags for start, flags in motion.items()},
         }
         draw_motion(lower, speed[inside], rows)
@@ -143,21 +147,12 @@ def _amplitudes(axes: Axes, speed: Reals, amplitude: dict[str, Reals]) -> None:
     axes.tick_params(labelbottom=True)
 
 
-def _published(support: str, speed: Reals) -> NDArray[np.int64]:
-    """Return the published motion as flags at each speed."""
-    flags = np.zeros(speed.shape, dtype=np.int64)
-    for name, first, last in published_regimes(support):
-        flag = int(Motion.CHAOTIC) if name == "chaotic" else int(name[:-1])
-        flags[(speed > first) & (speed <= last)] = flag
-    return flags
-
-
 def _flags(
     by_start: dict[str, xr.Dataset], inside: NDArray[np.bool_], options: Options
 ) -> list[NDArray[np.int64]]:
     """Return all motion flags that are drawn, the published ones as well."""
     speed = next(iter(by_start.values()))[SPEED].values[inside]
-    found = [_published(support, speed) for support in ("rigid", "flexible")]
+    found = [published_motion(support, speed) for support in ("rigid", "flexible")]
     for result in by_start.values():
         found += [
             _curve(result, support, options.stiffness)[1][inside]
@@ -173,14 +168,7 @@ def _motion_legend(figure: Figure, flags: Sequence[NDArray[np.int64]]) -> None:
         Patch(facecolor=CLASSES[at][1], edgecolor=style.GREY, linewidth=0.3, label=CLASSES[at][0])
         for at in seen
     ]
-    figure.legend(
-        handles=handles,
-        loc="outside lower center",
-        ncol=len(handles),
-        handlelength=1.2,
-        title="motion (T: mesh period)",
-        title_fontsize=6,
-    )
+    legend_below(figure, handles, "motion (T: mesh period)")
 
 
 def _report(

@@ -88,7 +88,7 @@ def draw(result: xr.Dataset, options: Options) -> list[Drawing]:
     report = map_table(stiffness, speed, amplitude, regular, crest, told)
     return [
         Drawing("figure9_map", _map(speed, stiffness, amplitude, status, crest, told), report),
-        Drawing("figure9_surface", draw_surface(speed, stiffness, amplitude)),
+        Drawing("figure9_surface", draw_surface(speed, stiffness, amplitude, crest)),
     ]
 
 

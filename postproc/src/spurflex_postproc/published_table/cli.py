@@ -76,11 +76,16 @@ def build(sources: Sources) -> tuple[list[Row], list[Row], list[Setting]]:
     standing = standing_explanations()
 
     def from_curves(result: xr.Dataset) -> list[Row]:
-        return [*curve_rows(result), *regime_rows(result), *point_rows(result, sources.spectra)]
+        return [*curve_rows(result), *regime_rows(result)]
 
     rows = from_curves(sources.reference)
+    rows += point_rows([*sources.points, sources.reference])
     settings: list[Setting] = [(f"start = '{REFERENCE}'", "reference", rows)]
-    tried = [(trial, from_curves(trial.result)) for trial in sources.trials]
+    tried = [
+        (trial, [*from_curves(trial.result), *point_rows([trial.result], complete=False)])
+        for trial in sources.trials
+    ]
+    tried += [(trial, point_rows([trial.result], complete=False)) for trial in sources.point_trials]
     settings += [(trial.label, trial.kind, some) for trial, some in tried]
     rows = explained(rows, tried, standing)
     if sources.map is None:

@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 
-from spurflex_postproc.published_table.row import Row
+from spurflex_postproc.published_table.row import Row, written
 from spurflex_postproc.published_table.sources import Trial
 
 CAUSES = {
-    "start": "the start decides",
-    "step": "the time step decides",
-    "parameter": "a parameter decides",
+    "start": "with another start",
+    "step": "with another time step",
+    "parameter": "with another parameter",
+    "both": "with another time step and parameter",
 }
 """What a trial shows by its kind."""
 SIMPLEST = tuple(CAUSES)
@@ -56,7 +57,13 @@ def _evidence(row: Row, there: Sequence[tuple[Trial, Row]]) -> str:
         return f"{CAUSES[trial.kind]}: {trial.label} gives {shown(other)}"
     known = [one for one in there if one[1].deviation is not None]
     if row.deviation is None and not known:
-        return f"none of {len(there)} other settings gives it either"
+        none = f"none of {len(there)} other settings gives it either"
+        trial, other = max(there, key=lambda one: one[1].met or 0.0)
+        if (other.met or 0.0) <= (row.met or 0.0):
+            return none
+        return f"{none}; nearest: {trial.label} gives {shown(other)}" + (
+            f" ({other.note})" if other.note else ""
+        )
     best = min(known, key=lambda one: _distance(one[1]), default=None)
     if best is None or (row.deviation is not None and _distance(best[1]) >= _distance(row)):
         return f"no nearer with any of {len(there)} other settings"
@@ -75,5 +82,5 @@ def shown(row: Row) -> str:
     if row.computed is None:
         return "nothing"
     if row.deviation is None:
-        return str(row.computed)
-    return f"{row.computed:.0f} ({100 * row.deviation:+z.1f} %)"
+        return written(row.computed)
+    return f"{written(row.computed)} ({100 * row.deviation:+z.1f} %)"

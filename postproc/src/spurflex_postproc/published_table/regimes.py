@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from spurflex_postproc.features.curve import CurveFeatures, curve_features
-from spurflex_postproc.features.orders import dominant_order, find_orders
+from spurflex_postproc.features.orders import Line, find_lines, second_frequency
 from spurflex_postproc.features.regimes import (
     IRREGULAR,
     flag_name,
@@ -23,6 +23,12 @@ from spurflex_postproc.published import (
     tolerance,
 )
 from spurflex_postproc.published_table.row import Row, number, statement
+from spurflex_postproc.recordings import SPECTRUM, Spectra, has_recording, read_spectra
+
+SPEED_CLOSE = 0.5
+"""Largest distance of the speed of a point from the published one [rev/min]."""
+LISTED = 12
+"""Most lines of a spectrum that a row lists."""
 
 SIDES = {
     "lower": "end of the lower range; another motion follows",
@@ -96,6 +102,8 @@ def _chaotic(result: xr.Dataset, found: CurveFeatures, support: str) -> Row:
         if values.size:
             note = f"largest Lyapunov exponent {values.max():+.1e} per mesh period"
     chaotic = counts[flags == Motion.CHAOTIC].sum() / max(int(inside.sum()), 1)
+    irregular = np.array([motion_name(int(flag)) == IRREGULAR for flag in flags], dtype=bool)
+    met = float(counts[irregular].sum() / max(int(inside.sum()), 1))
     return statement(
         f"figure 3 {support} chaos",
         "3",
@@ -104,96 +112,127 @@ def _chaotic(result: xr.Dataset, found: CurveFeatures, support: str) -> Row:
         ", ".join(shares[:4]),
         bool(chaotic > 0.5),
         note,
+        met=met,
     )
 
 
-def point_rows(result: xr.Dataset, spectra: Sequence[xr.Dataset]) -> list[Row]:
+def point_rows(results: Sequence[xr.Dataset], *, complete: bool = True) -> list[Row]:
     """Compare the motion and the spectrum at the five speeds of figures 4 to 8.
 
     Args:
-        result: A dataset from `open_result` with the flexible support and one stiffness.
-        spectra: Datasets with the variable `spectrum` on (support_stiffness, speed, order).
+        results: Datasets from `open_result` with the flexible support. Each motion and each
+            spectrum is taken from the first that holds it.
+        complete: Whether rows that cannot be told are listed as open; if not, they are left out.
 
     Returns:
-        For each speed the motion, the strongest order and the other orders. Without a spectrum
-        at that speed the latter two stay open.
+        For each speed the motion, the strongest order and the other orders.
     """
-    found = curve_features(result, "flexible")
     rows = []
     for point in published_points():
-        flag = int(found.motion[found.at(point.speed)])
-        named = flag_name(flag)
-        rows.append(
-            statement(
-                f"figure {point.figure} motion",
-                point.figure,
-                f"flexible support, {point.speed:.0f} rev/min: motion",
-                point.motion,
-                named,
-                named == point.motion,
-                "irregular" if motion_name(flag) == IRREGULAR and named != "chaotic" else "",
-            )
+        key, where = f"figure {point.figure}", f"flexible support, {point.speed:.0f} rev/min"
+        flag = next(
+            (
+                int(result["motion"].values[0, column])
+                for result in results
+                if (column := _column(result, point.speed)) is not None
+            ),
+            None,
         )
-        rows += _orders(point, spectra)
+        if flag is not None:
+            named, irregular = flag_name(flag), motion_name(flag) == IRREGULAR
+            rows.append(
+                statement(
+                    f"{key} motion",
+                    point.figure,
+                    f"{where}: motion",
+                    point.motion,
+                    named,
+                    named == point.motion,
+                    "irregular" if irregular and named != "chaotic" else "",
+                    met=float(irregular == (point.motion == "chaotic")) / 2,
+                )
+            )
+        elif complete:
+            rows.append(_open(f"{key} motion", point, f"{where}: motion", point.motion))
+        rows += _orders(point, results, complete=complete)
     return rows
 
 
-def _orders(point: PublishedPoint, spectra: Sequence[xr.Dataset]) -> list[Row]:
+def _orders(point: PublishedPoint, results: Sequence[xr.Dataset], *, complete: bool) -> list[Row]:
     """Compare the lines of the spectrum."""
-    key = f"figure {point.figure}"
-    where = f"flexible support, {point.speed:.0f} rev/min"
-    lines = _spectrum(point.speed, spectra)
-    wanted = ", ".join(f"{order:g}" for order in point.orders)
-    if lines is None:
-        missing = "no result file holds the spectrum at this speed"
-        head = statement(
-            f"{key} dominant",
-            point.figure,
-            f"{where}: strongest order",
-            f"{point.dominant:g}",
-            None,
-            None,
-            missing,
-        )
-        rest = statement(
-            f"{key} orders", point.figure, f"{where}: other orders", wanted, None, None, missing
-        )
-        return [head, rest]
-    order, amplitude = lines
+    key, where = f"figure {point.figure}", f"flexible support, {point.speed:.0f} rev/min"
+    dominant, others = f"{where}: strongest order", f"{where}: other orders"
+    wanted = ", ".join(f"{order:.4g}" for order in point.orders)
+    found = _spectrum(point.speed, results)
+    if found is None:
+        if not complete:
+            return []
+        return [
+            _open(f"{key} dominant", point, dominant, f"{point.dominant:g}"),
+            _open(f"{key} orders", point, others, wanted),
+        ]
     close = tolerance("order")
-    peaks = find_orders(order, amplitude)
-    absent = [one for one in point.orders if not any(abs(p - one) <= close for p in peaks)]
+    lines = find_lines(found.order, found.amplitude[0])
+    if not lines:
+        return []
+    strengths = {one: _strength(one, lines, close) for one in point.orders}
+    absent = [f"{one:.4g}" for one, strength in strengths.items() if not strength]
+    notes = [f"lacking {', '.join(absent)}"] if absent else []
+    notes += [strength for strength in strengths.values() if strength]
+    second = second_frequency([line.order for line in lines[:LISTED]])
+    if second is not None:
+        notes.append(f"the lines are combinations of 1 and {second:.3f}")
     return [
         number(
             f"{key} dominant",
             point.figure,
-            f"{where}: strongest order",
+            dominant,
             point.dominant,
-            dominant_order(order, amplitude),
+            lines[0].order,
             close,
+            note=_strength(point.dominant, lines, close),
         ),
         statement(
             f"{key} orders",
             point.figure,
-            f"{where}: other orders",
+            others,
             wanted,
-            ", ".join(f"{one:.2f}" for one in peaks),
+            ", ".join(f"{line.order:.2f}" for line in lines[:LISTED]),
             not absent,
-            f"lacking {', '.join(f'{one:g}' for one in absent)}" if absent else "",
+            "; ".join(notes),
+            met=1 - len(absent) / len(point.orders),
         ),
     ]
 
 
-def _spectrum(speed: float, spectra: Sequence[xr.Dataset]) -> tuple[np.ndarray, np.ndarray] | None:
-    """Look for the spectrum at a speed [rev/min]; orders and amplitudes, shape (n,)."""
-    for result in spectra:
-        at = int(np.argmin(np.abs(result[SPEED].values - speed)))
-        if abs(float(result[SPEED].values[at]) - speed) > 0.5:
+def _strength(order: float, lines: Sequence[Line], close: float) -> str:
+    """Say how strong the line at an order is; empty if there is none."""
+    for line in lines:
+        if abs(line.order - order) <= close:
+            return f"{order:.4g}: {100 * line.amplitude / lines[0].amplitude:.1f} %"
+    return ""
+
+
+def _open(key: str, point: PublishedPoint, feature: str, published: str) -> Row:
+    """Make a row that the results do not tell."""
+    return statement(
+        key, point.figure, feature, published, None, None, "no result file tells it at this speed"
+    )
+
+
+def _column(result: xr.Dataset, speed: float) -> int | None:
+    """Return the position of a speed [rev/min] in a result; None if it is not there."""
+    at = int(np.argmin(np.abs(result[SPEED].values - speed)))
+    return at if abs(float(result[SPEED].values[at]) - speed) <= SPEED_CLOSE else None
+
+
+def _spectrum(speed: float, results: Sequence[xr.Dataset]) -> Spectra | None:
+    """Look for a spectrum of y1 on the flexible support at a speed [rev/min]."""
+    for result in results:
+        column = _column(result, speed)
+        if column is None or not has_recording(result, SPECTRUM, "y1", "flexible"):
             continue
-        values = result["spectrum"].isel({SPEED: at})
-        others = {name: 0 for name in values.dims if name != "order"}
-        values = values.isel(others)
-        amplitude = np.asarray(values.values, dtype=float)
-        if np.isfinite(amplitude).any():
-            return np.asarray(result["order"].values, dtype=float), amplitude
+        spectrum = read_spectra(result, "y1", "flexible", 0, column)
+        if np.isfinite(spectrum.amplitude).any():
+            return spectrum
     return None

@@ -5,6 +5,9 @@ from typing import Any
 
 Value = float | str | None
 
+SMALLEST_SPEED = 20.0
+"""Values from here on are speeds [rev/min], smaller ones orders."""
+
 
 @dataclass(frozen=True)
 class Row:
@@ -20,6 +23,7 @@ class Row:
         agrees: Whether it agrees; None if the results do not tell.
         note: What else was seen, in one line.
         explanation: Why it does not agree, in one line, with the evidence.
+        met: How much of a statement is met, from 0 to 1; None if that has no parts.
     """
 
     key: str
@@ -31,6 +35,7 @@ class Row:
     agrees: bool | None = None
     note: str = ""
     explanation: str = ""
+    met: float | None = None
 
     @property
     def deviation(self) -> float | None:
@@ -87,7 +92,18 @@ def statement(
     computed: str | None,
     agrees: bool | None,
     note: str = "",
+    *,
+    met: float | None = None,
 ) -> Row:
     """Make the row of a statement in words; arguments as of `Row`."""
     verdict = None if agrees is None else bool(agrees)
-    return Row(key, figure, feature, published, computed, None, verdict, note)
+    return Row(key, figure, feature, published, computed, None, verdict, note, met=met)
+
+
+def written(value: Value) -> str:
+    """Write a value; speeds without decimals, orders with two."""
+    if value is None:
+        return "none"
+    if isinstance(value, float):
+        return f"{value:.0f}" if abs(value) >= SMALLEST_SPEED else f"{value:.2f}"
+    return value

@@ -13,11 +13,13 @@ STARTS = ("up", "down", "static", "rest")
 REFERENCE = "up"
 """The start whose curves are compared: the article lets the speed increase."""
 REFERENCE_FILE = f"figure2-{REFERENCE}.h5"
-PLAIN_FILE = "figure2.h5"
+POINT_FIGURES = ("4", "5", "6", "7", "8")
 MAP_FILE = "figure9.h5"
 LEFT_OUT = (
     *("title", "file", "products", "max_periods", "measured_periods"),
-    *("speed_first", "speed_last", "speed_count"),
+    *("support", "speed_first", "speed_last", "speed_count"),
+    *("quantities", "highest_order", "spectrum_periods", "sections"),
+    *("history_periods", "history_samples"),
 )
 """Keys of a deck that do not change what is compared."""
 STEP_KEYS = ("integrator", "steps_per_period", "newmark_beta", "newmark_gamma", "tolerance")
@@ -32,7 +34,7 @@ class Trial:
 
     Attributes:
         label: How its deck differs from the reference, in words.
-        kind: What it changes: 'start', 'step' or 'parameter'.
+        kind: What it changes: 'start', 'step', 'parameter', or 'both' of the latter.
         result: The dataset.
     """
 
@@ -47,15 +49,17 @@ class Sources:
 
     Attributes:
         curves: Results of figure 2 by start; the reference is among them.
-        trials: Results of figure 2 with other settings, the other starts among them.
+        trials: Results of figures 2 and 3 with other settings, the other starts among them.
         map: Result of figure 9; None if there is no such file.
-        spectra: Results with the variable `spectrum`, in any order.
+        points: Results of figures 4 to 8 with the settings of the paper's deck.
+        point_trials: Results of figures 4 to 8 with settings that no trial has.
     """
 
     curves: dict[str, xr.Dataset]
     trials: list[Trial]
     map: xr.Dataset | None
-    spectra: list[xr.Dataset]
+    points: list[xr.Dataset]
+    point_trials: list[Trial]
 
     @property
     def reference(self) -> xr.Dataset:
@@ -67,8 +71,8 @@ def load(folder: Path) -> Sources:
     """Read the result files of a folder.
 
     Args:
-        folder: Holds `figure2.h5` or `figure2-*.h5` with both supports, and perhaps `figure9.h5`
-            and further `figure*.h5`.
+        folder: Holds `figure2-up.h5` with both supports, and perhaps `figure9.h5`, `figure4.h5`
+            to `figure8.h5` and further `figure2*.h5`, `figure3*.h5`, `figure4-*.h5`, ...
 
     Returns:
         The sources.
@@ -80,24 +84,44 @@ def load(folder: Path) -> Sources:
     reference, base = open_result(path), _settings(path)
     curves = {REFERENCE: reference}
     trials = []
-    for other in sorted(folder.glob("figure2*.h5")):
-        if other == path:
+    seen: list[dict[str, str]] = [{}]
+    # Figure 3 first: it holds spectra beside the curves.
+    for other in [*sorted(folder.glob("figure3*.h5")), *sorted(folder.glob("figure2*.h5"))]:
+        changed = _changed(base, other)
+        if other == path or changed in seen:
             continue
-        values, result = _settings(other), open_result(other)
-        changed = {key: value for key, value in values.items() if base.get(key) != value}
-        start = values.get("start", "").strip("'")
+        seen.append(changed)
+        trials.append(_trial(other, changed))
         if set(changed) == {"start"}:
-            curves[start] = result
-        title = str(result.attrs.get("title", ""))
-        trials.append(Trial(difference(changed, title), kind(changed), result))
-    spectra = [
-        found
-        for other in sorted(folder.glob("figure*.h5"))
-        if other != path and "spectrum" in (found := open_result(other))
+            curves[changed["start"].strip("'")] = trials[-1].result
+    points = [
+        open_result(folder / f"figure{number}.h5")
+        for number in POINT_FIGURES
+        if (folder / f"figure{number}.h5").exists()
     ]
+    point_trials = []
+    for number in POINT_FIGURES:
+        for other in sorted(folder.glob(f"figure{number}-*.h5")):
+            changed = _changed(base, other)
+            if changed not in seen:
+                point_trials.append(_trial(other, changed))
     ordered = {start: curves[start] for start in STARTS if start in curves}
     map_ = folder / MAP_FILE
-    return Sources(ordered, trials, open_result(map_) if map_.exists() else None, spectra)
+    return Sources(
+        ordered, trials, open_result(map_) if map_.exists() else None, points, point_trials
+    )
+
+
+def _changed(base: dict[str, str], path: Path) -> dict[str, str]:
+    """Return the keys that differ from those of the reference, with their values."""
+    return {key: value for key, value in _settings(path).items() if base.get(key) != value}
+
+
+def _trial(path: Path, changed: dict[str, str]) -> Trial:
+    """Open a result and name its settings."""
+    result = open_result(path)
+    title = str(result.attrs.get("title", ""))
+    return Trial(difference(changed, title), kind(changed), result)
 
 
 def _settings(path: Path) -> dict[str, str]:
@@ -116,7 +140,8 @@ def difference(changed: dict[str, str], title: str = "") -> str:
 
 
 def kind(changed: dict[str, str]) -> str:
-    """Return what changed keys of a deck change: 'start', 'step' or 'parameter'."""
-    if set(changed) <= {"start"}:
-        return "start"
-    return "step" if set(changed) <= {"start", *STEP_KEYS} else "parameter"
+    """Return what changed keys of a deck change: 'start', 'step', 'parameter' or 'both'."""
+    step = set(changed) & set(STEP_KEYS)
+    if set(changed) - {"start"} - step:
+        return "both" if step else "parameter"
+    return "step" if step else "start"

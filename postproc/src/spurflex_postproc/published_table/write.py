@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from spurflex_postproc.markdown import table
-from spurflex_postproc.published_table.row import Row, Value
+from spurflex_postproc.published_table.row import Row, written
 
 PREAMBLE = """\
 # Published against computed
@@ -54,7 +54,7 @@ def markdown(
     parts.append(
         table(
             ["claim", "computed", "supported", "beside it"],
-            [[row.feature, _value(row.computed), verdict(row), row.note] for row in conclusions],
+            [[row.feature, written(row.computed), verdict(row), row.note] for row in conclusions],
         )
     )
     if settings:
@@ -65,8 +65,8 @@ def markdown(
         parts.append("## Disagreements\n")
         parts.append(
             "\n".join(
-                f"- figure {row.figure}, {row.feature} {_value(row.published)}: computed"
-                f" {_value(row.computed)}{_off(row)}. {row.explanation or 'No evidence yet.'}"
+                f"- figure {row.figure}, {row.feature} {written(row.published)}: computed"
+                f" {written(row.computed)}{_off(row)}. {row.explanation or 'No evidence yet.'}"
                 for row in lacking
             )
             + "\n"
@@ -101,21 +101,12 @@ def _cells(row: Row) -> list[str]:
     return [
         row.figure,
         row.feature,
-        _value(row.published),
-        _value(row.computed),
+        written(row.published),
+        written(row.computed),
         _off(row).strip(" ()") or "-",
         verdict(row),
         row.note,
     ]
-
-
-def _value(value: Value) -> str:
-    """Write a value; speeds without decimals, orders with two."""
-    if value is None:
-        return "none"
-    if isinstance(value, float):
-        return f"{value:.0f}" if abs(value) >= 20 else f"{value:.2f}"
-    return value
 
 
 def _settings(settings: Sequence[tuple[str, str, Sequence[Row]]]) -> str:
@@ -125,7 +116,8 @@ def _settings(settings: Sequence[tuple[str, str, Sequence[Row]]]) -> str:
         cells = []
         for figures in ("2", "3", "45678"):
             found = counts([row for row in rows if row.figure in figures])
-            cells.append(f"{found['yes']} of {found['yes'] + found['no']}")
+            told = found["yes"] + found["no"]
+            cells.append(f"{found['yes']} of {told}" if told else "-")
         order = {row.key: str(row.computed) for row in rows}
         sequences = [order.get(f"figure 3 {one} order", "") for one in ("rigid", "flexible")]
         lines.append([label, kind, *cells, *sequences])
