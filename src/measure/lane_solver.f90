@@ -17,7 +17,7 @@ module spurflex_measure_lane_solver
    use spurflex_steady_search, only: describe_orbit
    use spurflex_steady_sections, only: weighted_norm
    use spurflex_steady_shooting, only: periodic_orbit, find_orbits
-   use spurflex_steady_stability, only: find_stable_orbits
+   use spurflex_steady_stability, only: find_stable_orbits, reduce_periods
    implicit none
    private
 
@@ -252,6 +252,9 @@ contains
                          measured)
       call find_orbits(solver%judge, members, sizes(solver%points, members, judged), visitor, judged, found, &
                        monodromy_is_near=.true., roughly=.true.)
+      ! Large steps can split a motion in two where the teeth graze.
+      call reduce_periods(solver%judge, members, found, visitor, judged)
+      found = found .and. judged%periods == orbits(members)%periods
       do i = 1, size(members)
          states(:, i) = judged(i)%state
       end do

@@ -10,7 +10,7 @@ module spurflex_steady_stability
    implicit none
    private
 
-   public :: find_stable_orbits, largest_multiplier
+   public :: find_stable_orbits, reduce_periods, largest_multiplier
 
    !> Distance of the sections of a motion, beside its size, that is none.
    real(wp), parameter :: same_section = 1.0e-6_wp
