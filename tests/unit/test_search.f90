@@ -16,6 +16,7 @@ module test_search
    use spurflex_measure_response, only: empty_response, motion_chaotic, &
       motion_quasi_periodic, response, status_settled
    use spurflex_model_equations, only: equations_type, new_equations, rest_deviation
+   use spurflex_model_parameters, only: gearbox
    use test_support, only: check, error_type, new_unittest, test_failed, unittest_type
    implicit none
    private
@@ -41,6 +42,7 @@ contains
                   new_unittest('soft supports from the static equilibrium', test_soft), &
                   new_unittest('soft supports from rest', test_rest), &
                   new_unittest('a 2T motion is not called 1T by Newmark, nor its numbers', test_refined_class), &
+                  new_unittest('a 1T motion that large steps split where the teeth graze', test_split), &
                   new_unittest('a weakly unstable 1T is not where a motion stays', test_weakly_unstable), &
                   new_unittest('a multiplier is given for periodic motions only', test_no_multiplier) &
                   ]
@@ -65,6 +67,24 @@ contains
       call new_solver(options, solver)
       call respond_one(solver, equations, position, velocity, nobody, answer)
    end subroutine solve_point
+
+   !> With 16 steps a mesh period the sections of this motion alternate by 4e-5 of it, next to the jump.
+   subroutine test_split(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      type(gearbox) :: box
+      type(response) :: answer
+      real(wp), allocatable :: position(:), velocity(:)
+
+      box = reference_box()
+      box%support_offset = 0.1127_wp
+      call solve_point(new_equations(reference_gears(), box, reference_load(), flexible_point(3090.0_wp, 10.0_wp**10.5_wp)), &
+                       solver_options(integrator=integrator_collocation, tolerance=1.0e-3_wp), position, velocity, answer)
+      call check(error, answer%status, status_settled, 'status')
+      if (allocated(error)) return
+      call check(error, answer%motion, 1, 'class')
+   end subroutine test_split
 
    !> Amplitude of y1 over the last periods of a long run by Runge-Kutta.
    function brute_force(equations, position, velocity, periods) result(amplitude)
