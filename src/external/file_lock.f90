@@ -132,9 +132,18 @@ contains
             call fatal_error(error, "'"//path//"' is needed for the lock, but holds something else; remove it", exit_mismatch)
             return
          end if
-         call write_holder(lock%stream, self, status)
+         call write_holder(lock%stream, self, reason)
+         if (reason /= 0_c_int) then
+            ! Removed while still locked, so that nobody else's file can be hit.
+            call remove_file(path, error)
+            status = c_fclose(lock%stream)
+            lock%stream = c_null_ptr
+            if (allocated(error)) deallocate (error)
+            call fatal_error(error, "cannot write the lock file '"//path//"': "//failure_reason(reason))
+            return
+         end if
          holder = line_of(path)
-         if (status == 0 .and. holder == self) then
+         if (holder == self) then
             lock%path = path
             return
          end if
@@ -163,21 +172,21 @@ contains
    end subroutine release_lock
 
    !> Put a process down as the holder.
-   subroutine write_holder(stream, holder, status)
+   subroutine write_holder(stream, holder, reason)
       !> Locked stream.
       type(c_ptr), intent(in) :: stream
       !> The process.
       character(len=*), intent(in) :: holder
-      !> 0, or not if it cannot be written.
-      integer(c_int), intent(out) :: status
+      !> 0, or the number of the error if it cannot be written.
+      integer(c_int), intent(out) :: reason
 
-      status = c_ftruncate(c_fileno(stream), 0_c_long)
-      if (status /= 0) return
-      if (c_fputs(c_string(holder//new_line('a')), stream) < 0_c_int) then
-         status = 1_c_int
-      else
-         status = c_fflush(stream)
+      reason = 0_c_int
+      if (c_ftruncate(c_fileno(stream), 0_c_long) == 0) then
+         if (c_fputs(c_string(holder//new_line('a')), stream) >= 0_c_int) then
+            if (c_fflush(stream) == 0) return
+         end if
       end if
+      reason = errno()
    end subroutine write_holder
 
    !> This process in words.

@@ -101,28 +101,29 @@ contains
    end subroutine begin
 
    !> Say how far the phase is, if the last time is long enough ago.
-   subroutine progress(self, done, total, remark)
+   subroutine progress(self, done, total, remaining, remark)
       !> Logger.
       class(logger), intent(inout) :: self
       !> Points done and points in all.
       integer(i8), intent(in) :: done, total
+      !> Time that the rest will take [s]; negative if nobody knows yet.
+      real(wp), intent(in) :: remaining
       !> What came out so far.
       character(len=*), intent(in) :: remark
 
-      real(wp) :: now, spent
+      real(wp) :: now
       character(len=:), allocatable :: left
 
       if (.not. self%active) return
       now = self%elapsed()
-      spent = now - self%phase_start
       if (self%half < 0.0_wp .and. 2_i8*done >= total) then
          self%half = now
-         self%estimate = spent*real(total - done, wp)/real(max(done, 1_i8), wp)
+         self%estimate = remaining
       end if
       if (now - self%last < progress_interval) return
       self%last = now
       left = 'unknown'
-      if (done > 0_i8) left = fixed_text(spent*real(total - done, wp)/real(done, wp), 0)//' s'
+      if (remaining >= 0.0_wp) left = fixed_text(remaining, 0)//' s'
       call self%say('  '//to_text(done)//' of '//to_text(total)//' points ('// &
                     fixed_text(100.0_wp*real(done, wp)/real(max(total, 1_i8), wp), 1)//' %), '//remark// &
                     '; elapsed '//fixed_text(now, 0)//' s, remaining about '//left)
@@ -137,7 +138,7 @@ contains
 
       now = self%elapsed()
       taken = now - self%half
-      if (self%half < 0.0_wp .or. now - self%phase_start < shortest_judged .or. taken <= 0.0_wp) return
+      if (self%half < 0.0_wp .or. self%estimate < 0.0_wp .or. now - self%phase_start < shortest_judged .or. taken <= 0.0_wp) return
       call self%say('remaining time as estimated at half of the points: '//fixed_text(self%estimate, 1)//' s; it took ' &
                     //fixed_text(taken, 1)//' s (error '//to_text(nint(100.0_wp*(self%estimate - taken)/taken))//' %)')
    end subroutine finish

@@ -4,7 +4,7 @@ module spurflex_io_results_create
       h5fcreate_f, h5fflush_f, h5gclose_f, h5gcreate_f, h5lcreate_hard_f, hid_t, hsize_t
    use spurflex_base_error, only: error_type, exit_mismatch, fatal_error
    use spurflex_base_kinds, only: wp
-   use spurflex_external_posix, only: rename_file, sync_file
+   use spurflex_external_posix, only: remove_file, rename_file, sync_file
    use spurflex_io_case, only: case_type
    use spurflex_io_hdf5, only: attach_scale, check, create_dataset, make_scale
    use spurflex_io_hdf5_text, only: write_attribute, write_text
@@ -43,6 +43,7 @@ contains
       !> Set if the file exists or cannot be made.
       type(error_type), allocatable, intent(out) :: error
 
+      type(error_type), allocatable :: next
       logical :: exists
 
       inquire (file=path, exist=exists)
@@ -53,11 +54,11 @@ contains
       call create_file(path//'.part', case, provenance, error)
       if (allocated(error)) return
       call sync_file(path//'.part', error)
-      if (allocated(error)) return
-      call rename_file(path//'.part', path, error)
+      if (.not. allocated(error)) call rename_file(path//'.part', path, error)
+      if (allocated(error)) call remove_file(path//'.part', next)
    end subroutine make_file
 
-   !> Make the file with every axis, variable and attribute, flush and close it.
+   !> Make the file with every axis, variable and attribute, flush and close it; leave none where that fails.
    subroutine create_file(path, case, provenance, error)
       !> Path of the file; replaced if it exists.
       character(len=*), intent(in) :: path
@@ -68,7 +69,7 @@ contains
       !> Set if the file cannot be made.
       type(error_type), allocatable, intent(out) :: error
 
-      type(error_type), allocatable :: close_error
+      type(error_type), allocatable :: close_error, remove_error
       integer(hid_t) :: file
       integer :: ierr
 
@@ -83,6 +84,7 @@ contains
       call h5fclose_f(file, ierr)
       call check(ierr, "close '"//path//"'", close_error)
       if (allocated(close_error) .and. .not. allocated(error)) call move_alloc(close_error, error)
+      if (allocated(error)) call remove_file(path, remove_error)
    end subroutine create_file
 
    !> Write everything that a new file holds.

@@ -43,7 +43,8 @@ contains
       if (now - self%last < interval) return
       self%last = now
       call self%schedule%serve()
-      call self%log%progress(sum(int(self%schedule%total, i8)), self%points, outcome_text(self%schedule%total))
+      call self%log%progress(sum(int(self%schedule%total, i8)), self%points, self%schedule%remaining(), &
+                             outcome_text(self%schedule%total))
    end subroutine attend_to_ranks
 
    !> How many points ended how.

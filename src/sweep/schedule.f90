@@ -1,12 +1,15 @@
 !> Which rank gets which chunk.
 !>
-!> Rank 0 works too and serves the others between its own periods; point-to-point messages only. Every other rank always
+!> Rank 0 hands out the chunks in the order of its forecast, which learns from the times of those that are done. It works too and serves the others between its own periods; point-to-point messages only. Every other rank always
 !> has one request on its way, so that the answer is there when it is needed.
 module spurflex_sweep_schedule
-   use mpi_f08, only: MPI_Comm, MPI_Request, MPI_Status, MPI_COMM_NULL, MPI_REQUEST_NULL, MPI_INTEGER, MPI_ANY_SOURCE, &
+   use mpi_f08, only: MPI_Comm, MPI_Request, MPI_Status, MPI_COMM_NULL, MPI_REQUEST_NULL, MPI_INTEGER8, MPI_ANY_SOURCE, &
       MPI_ANY_TAG, MPI_STATUS_IGNORE, mpi_comm_rank, mpi_comm_size, mpi_iprobe, mpi_probe, mpi_irecv, mpi_recv, mpi_send, &
       mpi_wait
-   use spurflex_base_kinds, only: wp
+   use spurflex_base_clock, only: steady_seconds
+   use spurflex_base_kinds, only: i8, wp
+   use spurflex_sweep_forecast, only: forecast_type, new_forecast
+   use spurflex_sweep_plan, only: chunk_type
    use spurflex_sweep_timekeeper, only: timekeeper
    implicit none
    private
@@ -18,22 +21,29 @@ module spurflex_sweep_schedule
 
    integer, parameter :: tag_request = 1, tag_last = 2, tag_assign = 3
    integer, parameter :: no_chunk = 0
-   !> A request tells the points finished and the longest chunk, an answer the chunk and the longest one of all ranks.
-   integer, parameter :: request_length = outcomes + 1, answer_length = 2
-   !> How times are sent: as whole milliseconds.
-   real(wp), parameter :: per_second = 1000.0_wp
+   !> A request tells the points finished, the longest chunk, the chunk that was done last and its time, an answer the chunk and
+   !> the longest one of all ranks.
+   integer, parameter :: request_length = outcomes + 3, answer_length = 2
+   integer, parameter :: longest = outcomes + 1, last = outcomes + 2, last_time = outcomes + 3
+   !> How times are sent: as whole microseconds.
+   real(wp), parameter :: per_second = 1.0e6_wp
 
    !> One rank's part in handing out chunks.
    type :: scheduler
       private
       type(MPI_Comm) :: comm = MPI_COMM_NULL
       integer :: rank = 0, ranks = 1
-      !> Rank 0: chunks in all, the last one handed out, ranks that have ended.
-      integer :: chunks = 0, handed_out = 0, ended = 0
+      !> Rank 0: what the chunks cost; moment at which the first one was handed out [s]; ranks that have ended.
+      type(forecast_type) :: forecast
+      real(wp) :: begun = 0.0_wp
+      integer :: ended = 0
+      !> The chunk in hand; the chunk that was done last, as long as rank 0 has not been told, and its time [s].
+      integer :: in_hand = no_chunk, last = no_chunk
+      real(wp) :: last_seconds = 0.0_wp
       !> Other ranks: no chunk is left; the answer on its way.
       logical :: exhausted = .false.
       type(MPI_Request) :: pending = MPI_REQUEST_NULL
-      integer, allocatable :: answer(:)
+      integer(i8), allocatable :: answer(:)
       !> This rank's time.
       type(timekeeper), pointer :: keeper => null()
       !> Points finished since the last message, by outcome.
@@ -47,6 +57,8 @@ module spurflex_sweep_schedule
       procedure :: count_point
       !> Rank 0: answer the requests that have come.
       procedure :: serve
+      !> Rank 0: how long the rest will take.
+      procedure :: remaining
       !> Wait for all ranks to end.
       procedure :: finish
    end type scheduler
@@ -59,8 +71,8 @@ contains
       type(scheduler), intent(inout) :: self
       !> The ranks.
       type(MPI_Comm), intent(in) :: comm
-      !> Number of chunks, the same on every rank.
-      integer, intent(in) :: chunks
+      !> The chunks, the same on every rank.
+      type(chunk_type), intent(in) :: chunks(:)
       !> This rank's time; stays where it is until `finish`.
       type(timekeeper), intent(inout), target :: keeper
 
@@ -68,9 +80,11 @@ contains
       self%keeper => keeper
       call mpi_comm_rank(comm, self%rank)
       call mpi_comm_size(comm, self%ranks)
-      self%chunks = chunks
-      self%handed_out = 0
+      if (self%rank == 0) self%forecast = new_forecast(chunks)
+      self%begun = steady_seconds()
       self%ended = 0
+      self%in_hand = no_chunk
+      self%last = no_chunk
       self%exhausted = .false.
       self%finished = 0
       self%total = 0
@@ -88,6 +102,8 @@ contains
       logical, intent(out) :: available
 
       call self%keeper%end_chunk()
+      self%last = self%in_hand
+      self%last_seconds = self%keeper%latest
       chunk = no_chunk
       available = .false.
       if (self%rank == 0) then
@@ -96,7 +112,7 @@ contains
          available = chunk /= no_chunk
       else if (.not. self%exhausted) then
          call mpi_wait(self%pending, MPI_STATUS_IGNORE)
-         chunk = self%answer(1)
+         chunk = int(self%answer(1))
          self%keeper%longest = max(self%keeper%longest, real(self%answer(2), wp)/per_second)
          available = chunk /= no_chunk
          ! A chunk that came too late is left for the next run.
@@ -104,6 +120,7 @@ contains
          self%exhausted = .not. available
          if (available) call request(self)
       end if
+      self%in_hand = merge(chunk, no_chunk, available)
       if (available) call self%keeper%begin_chunk()
    end subroutine take
 
@@ -126,8 +143,8 @@ contains
       logical :: waiting
 
       if (self%rank /= 0) return
-      self%total = self%total + self%finished
-      self%finished = 0
+      call learn(self, message_of(self))
+      call forget(self)
       do
          if (self%ranks == 1) return
          call mpi_iprobe(MPI_ANY_SOURCE, MPI_ANY_TAG, self%comm, waiting, MPI_STATUS_IGNORE)
@@ -148,7 +165,7 @@ contains
          end do
          call self%serve()
       else
-         call mpi_send(message_of(self), request_length, MPI_INTEGER, 0, tag_last, self%comm)
+         call mpi_send(message_of(self), request_length, MPI_INTEGER8, 0, tag_last, self%comm)
       end if
    end subroutine finish
 
@@ -158,21 +175,52 @@ contains
       class(scheduler), intent(inout) :: self
 
       type(MPI_Status) :: status
-      integer :: message(request_length), answer(answer_length)
+      integer(i8) :: message(request_length), answer(answer_length)
+      integer :: chunk
 
-      call mpi_recv(message, request_length, MPI_INTEGER, MPI_ANY_SOURCE, MPI_ANY_TAG, self%comm, status)
-      self%total = self%total + message(:outcomes)
-      self%keeper%longest = max(self%keeper%longest, real(message(request_length), wp)/per_second)
+      call mpi_recv(message, request_length, MPI_INTEGER8, MPI_ANY_SOURCE, MPI_ANY_TAG, self%comm, status)
+      call learn(self, message)
       if (status%MPI_TAG == tag_last) then
          self%ended = self%ended + 1
       else
-         call hand_out(self, answer(1))
-         answer(2) = milliseconds(self%keeper%longest)
-         call mpi_send(answer, answer_length, MPI_INTEGER, status%MPI_SOURCE, tag_assign, self%comm)
+         call hand_out(self, chunk)
+         answer = [int(chunk, i8), microseconds(self%keeper%longest)]
+         call mpi_send(answer, answer_length, MPI_INTEGER8, status%MPI_SOURCE, tag_assign, self%comm)
       end if
    end subroutine answer_one
 
-   !> Rank 0: the next chunk of the list; none once the run must stop.
+   !> Rank 0: count what a rank has finished.
+   subroutine learn(self, message)
+      !> Scheduler.
+      class(scheduler), intent(inout) :: self
+      !> What the rank tells.
+      integer(i8), intent(in) :: message(:)
+
+      self%total = self%total + int(message(:outcomes))
+      self%keeper%longest = max(self%keeper%longest, real(message(longest), wp)/per_second)
+      if (message(last) /= no_chunk) call self%forecast%note(int(message(last)), real(message(last_time), wp)/per_second)
+   end subroutine learn
+
+   !> What rank 0 has been told is not told again.
+   subroutine forget(self)
+      !> Scheduler.
+      class(scheduler), intent(inout) :: self
+
+      self%finished = 0
+      self%last = no_chunk
+   end subroutine forget
+
+   !> Rank 0: how long the rest will take; negative if nobody knows yet.
+   function remaining(self) result(seconds)
+      !> Scheduler.
+      class(scheduler), intent(in) :: self
+      !> The time [s].
+      real(wp) :: seconds
+
+      seconds = self%forecast%remaining(self%ranks, steady_seconds() - self%begun)
+   end function remaining
+
+   !> Rank 0: the next chunk of the forecast; none once the run must stop.
    subroutine hand_out(self, chunk)
       !> Scheduler.
       class(scheduler), intent(inout) :: self
@@ -180,10 +228,9 @@ contains
       integer, intent(out) :: chunk
 
       chunk = no_chunk
-      if (self%handed_out == self%chunks) return
+      if (self%forecast%is_exhausted()) return
       if (self%keeper%must_stop()) return
-      self%handed_out = self%handed_out + 1
-      chunk = self%handed_out
+      call self%forecast%next(chunk)
    end subroutine hand_out
 
    !> Other ranks: send a request, with what was finished since the last one, and be ready for the answer.
@@ -191,30 +238,32 @@ contains
       !> Scheduler.
       class(scheduler), intent(inout) :: self
 
-      call mpi_irecv(self%answer, answer_length, MPI_INTEGER, 0, tag_assign, self%comm, self%pending)
-      call mpi_send(message_of(self), request_length, MPI_INTEGER, 0, tag_request, self%comm)
-      self%finished = 0
+      call mpi_irecv(self%answer, answer_length, MPI_INTEGER8, 0, tag_assign, self%comm, self%pending)
+      call mpi_send(message_of(self), request_length, MPI_INTEGER8, 0, tag_request, self%comm)
+      call forget(self)
    end subroutine request
 
    !> What a rank tells rank 0.
    pure function message_of(self) result(message)
       !> Scheduler.
       class(scheduler), intent(in) :: self
-      !> Points finished, by outcome, and the longest chunk [ms].
-      integer :: message(request_length)
+      !> Points finished, by outcome, the longest chunk [us], the last one and its time [us].
+      integer(i8) :: message(request_length)
 
       message(:outcomes) = self%finished
-      message(request_length) = milliseconds(self%keeper%longest)
+      message(longest) = microseconds(self%keeper%longest)
+      message(last) = self%last
+      message(last_time) = microseconds(self%last_seconds)
    end function message_of
 
    !> A time as it is sent, rounded up.
-   pure function milliseconds(seconds) result(whole)
+   pure function microseconds(seconds) result(whole)
       !> The time [s].
       real(wp), intent(in) :: seconds
-      !> The time [ms].
-      integer :: whole
+      !> The time [us].
+      integer(i8) :: whole
 
-      whole = ceiling(min(per_second*seconds, 0.5_wp*real(huge(whole), wp)))
-   end function milliseconds
+      whole = ceiling(min(per_second*seconds, 0.5_wp*real(huge(whole), wp)), i8)
+   end function microseconds
 
 end module spurflex_sweep_schedule

@@ -1,7 +1,8 @@
 !> One rank's time: how long it was busy with how many points, and whether it may begin another chunk before the run must end.
 !>
 !> A run ends early when SIGUSR1 comes, when its stop file appears, or when the longest chunk seen on any rank would not be done
-!> within the wall-clock limit of the deck. It also ends early when somebody takes its result file away.
+!> within the wall-clock limit of the deck; the first chunk is begun whatever the limit, so that no run is in vain. It also ends
+!> early when somebody takes its result file away.
 module spurflex_sweep_timekeeper
    use mpi_f08, only: MPI_Comm, MPI_DOUBLE_PRECISION, mpi_comm_rank, mpi_comm_size, mpi_gather
    use spurflex_base_clock, only: steady_seconds
@@ -37,6 +38,8 @@ module spurflex_sweep_timekeeper
       integer :: points = 0
       !> Longest chunk of any rank, as far as is known here [s].
       real(wp) :: longest = 0.0_wp
+      !> The chunk that was done last [s].
+      real(wp) :: latest = 0.0_wp
       !> Moment the chunk in hand began, negative without one; moment of the next look [s].
       real(wp), private :: begun = -1.0_wp, next_look = 0.0_wp
       !> Time in chunks [s].
@@ -106,6 +109,7 @@ contains
       if (self%begun < 0.0_wp) return
       seconds = steady_seconds() - self%begun
       self%begun = -1.0_wp
+      self%latest = seconds
       self%busy = self%busy + seconds
       self%longest = max(self%longest, seconds)
    end subroutine end_chunk
@@ -125,7 +129,7 @@ contains
       now = steady_seconds()
       if (drain_is_asked_for()) then
          self%reason = 'by SIGUSR1'
-      else if (now + reserve_factor*self%longest + reserve_to_close > self%deadline) then
+      else if (self%longest > 0.0_wp .and. now + reserve_factor*self%longest + reserve_to_close > self%deadline) then
          self%reason = 'by the wall-clock limit of '//limit_text(self%limit)
       else if (self%looks .and. now >= self%next_look) then
          self%next_look = now + look_interval

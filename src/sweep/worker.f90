@@ -66,7 +66,7 @@ contains
 
       visitor%log => log
       visitor%points = sum(int(chunks%rows, i8)*chunks%count)
-      call new_scheduler(visitor%schedule, comm, size(chunks), keeper)
+      call new_scheduler(visitor%schedule, comm, chunks, keeper)
       options = case%solver
       options%multipliers = any(case%output%products == 'floquet' .or. case%output%products == 'lyapunov')
       allocate (solver)

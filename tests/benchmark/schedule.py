@@ -1,6 +1,7 @@
 """The program's rule of scheduling, replayed: which rank gets which chunk, and when it is done.
 
-Mirrors src/sweep/plan.f90 (how chunks are cut) and src/sweep/schedule.f90 (how they are handed out).
+Mirrors src/sweep/plan.f90 (how chunks are cut), src/sweep/forecast.f90 (in which order they are handed
+out) and src/sweep/schedule.f90 (how).
 """
 
 import heapq
@@ -13,6 +14,7 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
 PLAN = ROOT / "src" / "sweep" / "plan.f90"
+FORECAST = ROOT / "src" / "sweep" / "forecast.f90"
 ATTENDANCE = ROOT / "src" / "sweep" / "attendance.f90"
 
 
@@ -77,19 +79,110 @@ def cut(costs, length):
     return np.add.reduceat(np.add.reduceat(costs, rows, axis=0), speeds, axis=1).reshape(-1)
 
 
-def replay(costs, ranks, machine):
-    """Time [s] until all ranks have done chunks of these costs.
+class InOrder:
+    """Chunks in the order of the list."""
+
+    def __init__(self, chunks):
+        self.order = iter(range(chunks))
+
+    def next(self):
+        """The next chunk to hand out."""
+        return next(self.order)
+
+    def note(self, chunk, seconds):
+        """Learns nothing."""
+
+
+class Forecast:
+    """The order of the program: a pilot, then dearest first. Mirrors src/sweep/forecast.f90 for a grid of tiles."""
+
+    def __init__(self, shape, points):
+        """`shape`: tiles in both directions (row, speed); `points` of each tile, flat."""
+        names = ("pilot_share", "pilot_skew", "speed_step", "row_step", "classes_per_octave")
+        share, skew, *steps, self.per_octave = (int(parameter(FORECAST, name)) for name in names)
+        self.speed_step, self.row_step = steps
+        row, speed = np.indices(shape)
+        in_pilot = ((speed + skew * row) % share == 0).reshape(-1)
+        numbers = np.arange(in_pilot.size)
+        self.order = np.concatenate([numbers[in_pilot], numbers[~in_pilot]])
+        self.pilot = int(in_pilot.sum())
+        self.shape, self.points = shape, np.asarray(points, float)
+        self.seconds = np.full(in_pilot.size, np.nan)
+        self.handed_out = self.known = 0
+        self.ordered = False
+        self.next_revision = 1
+
+    def next(self):
+        """The next chunk to hand out."""
+        if self.handed_out >= self.pilot and not self.ordered:
+            self.revise()
+        self.handed_out += 1
+        return int(self.order[self.handed_out - 1])
+
+    def note(self, chunk, seconds):
+        """A chunk has taken its time."""
+        self.seconds[chunk] = seconds
+        self.known += 1
+        if self.known >= self.next_revision:
+            self.revise()
+
+    def revise(self):
+        """Put the chunks that are neither handed out nor in the pilot in order."""
+        self.next_revision = 2 * max(self.known, 1)
+        # Before the pilot is handed out, the program changes only its estimate of the time.
+        self.ordered = self.handed_out >= self.pilot
+        if not self.ordered or self.known == 0:
+            return
+        expected = self.points * (self.seconds / self.points)[self.nearest()]
+        rest = self.order[self.handed_out :]
+        self.order[self.handed_out :] = rest[dearest_first(expected[rest], self.per_octave)]
+
+    def nearest(self):
+        """For each tile the nearest one of which the time is known."""
+        tiles = self.seconds.size
+        far = tiles * (self.shape[1] * self.speed_step + self.shape[0] * self.row_step)
+        key = (np.where(np.isfinite(self.seconds), 0, far) + np.arange(tiles)).reshape(self.shape)
+        for axis, step in ((1, self.speed_step), (0, self.row_step)):
+            way = tiles * step * np.arange(self.shape[axis])
+            way = way[None, :] if axis == 1 else way[:, None]
+            forward = np.minimum.accumulate(key - way, axis=axis) + way
+            backward = np.flip(np.minimum.accumulate(np.flip(key + way, axis), axis=axis), axis) - way
+            key = np.minimum(forward, backward)
+        return (key % tiles).reshape(-1)
+
+
+def dearest_first(costs, per_octave):
+    """Order by cost to within a class, equal ones as they are."""
+    if not costs.size:
+        return np.arange(0)
+    least = np.finfo(float).tiny
+    octaves = -np.log2(np.maximum(costs, least) / max(costs.max(), least))
+    last = 24 * per_octave - 1
+    return np.argsort(np.minimum(last, (per_octave * octaves).astype(int)), kind="stable")
+
+
+def forecast(length, shape):
+    """The forecast of tiles that are meant to have so many points, on a grid (row, speed)."""
+    tiles = tuple(-(-n // step) for n, step in zip(shape, tile(length, shape), strict=True))
+    return Forecast(tiles, cut(np.ones(shape), length))
+
+
+def replay(costs, ranks, machine, order=None):
+    """Time [s] until all ranks have done chunks of these costs, handed out in an order: that of the list.
 
     Mirrors src/sweep/schedule.f90. Every rank but rank 0 has one request on its way: when it begins a
-    chunk it asks for the next one. Rank 0 works too; it answers the requests that have come when it
-    takes a chunk itself and every `attendance` seconds in between, and at once when no chunk is left.
+    chunk it asks for the next one, and tells the time of the one before. Rank 0 works too; it answers the
+    requests that have come when it takes a chunk itself and every `attendance` seconds in between, and at
+    once when no chunk is left.
     """
     costs = [float(c) + machine.write for c in costs]
+    order = InOrder(len(costs)) if order is None else order
     chunks = len(costs)
     if ranks == 1:
         return sum(costs)
     free = [0.0] * ranks
     requests = [(machine.latency, r) for r in range(1, ranks)]  # sorted, so a heap
+    in_hand = [[] for _ in range(ranks)]  # chunks of which the time is not told yet, in order
     given = 0
     clock = 0.0
     left = 0.0  # work that rank 0 still has on its chunk
@@ -100,9 +193,15 @@ def replay(costs, ranks, machine):
         while requests and requests[0][0] <= clock:
             rank = requests[0][1]
             clock += machine.service
+            # It came when the last of these chunks was begun.
+            while len(in_hand[rank]) > 1:
+                done = in_hand[rank].pop(0)
+                order.note(done, costs[done])
             if given < chunks:
                 begin = max(free[rank], clock + machine.latency)
-                free[rank] = begin + costs[given]
+                chunk = order.next()
+                in_hand[rank].append(chunk)
+                free[rank] = begin + costs[chunk]
                 given += 1
                 heapq.heapreplace(requests, (begin + machine.latency, rank))
             else:
@@ -115,7 +214,10 @@ def replay(costs, ranks, machine):
                     break
                 clock = max(clock, requests[0][0])
                 continue
-            left = costs[given]
+            for done in in_hand[0]:
+                order.note(done, costs[done])
+            in_hand[0] = [order.next()]
+            left = costs[in_hand[0][0]]
             given += 1
         # It works until it looks and finds something, or until its chunk is done.
         look = clock + left

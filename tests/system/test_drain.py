@@ -62,6 +62,18 @@ def test_wall_clock_limit(root, run, program, mpiexec, whole, tmp_path):
     assert done_count(folder / "map.h5") > 0
 
 
+def test_limit_too_short_for_the_start(root, run, whole, tmp_path):
+    """However short the limit, every start computes something: repeated often enough the sweep ends."""
+    deck = map_deck(root, tmp_path, rows=ROWS, limit=1e-3 / 60)
+    counts = [0]
+    for _ in range(3):
+        done = run(deck, ranks=2, environment=EPOCH)
+        assert done.returncode == EXIT_STOPPED, done.stderr
+        counts.append(done_count(tmp_path / "map.h5"))
+        assert counts[-1] > counts[-2]
+    assert_done_points_are_right(snapshot(tmp_path / "map.h5"), snapshot(whole))
+
+
 def test_changed_limit_is_the_same_deck(root, run, whole, tmp_path):
     """A run with a limit and one without make the file of a run without."""
     deck = map_deck(root, tmp_path, rows=ROWS, limit=1.3 / 60)

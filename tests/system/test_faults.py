@@ -99,6 +99,20 @@ def test_fresh_on_a_full_disk_keeps_the_old_file(root, run, tmp_path):
         assert (disk / "map.h5").read_bytes() == before
 
 
+def test_disk_full_when_gone_on(root, run, tmp_path):
+    """Not even the lock can be written: it is said, and nothing is left behind."""
+    with mounted(tmp_path / "disk", "-t", "tmpfs", "-o", "size=1m", "tmpfs") as disk:
+        deck = map_deck(root, tmp_path, file="disk/map.h5", rows=3, speeds=20)
+        assert run(deck).returncode == EXIT_COMPLETE
+        before = (disk / "map.h5").read_bytes()
+        fill(disk)
+        done = run(deck, ranks=2)
+        assert done.returncode == EXIT_INTERNAL
+        assert "cannot write the lock file 'disk/map.h5.lock': No space left on device" in done.stderr
+        assert {path.name for path in disk.iterdir()} == {"map.h5", "rest"}
+        assert (disk / "map.h5").read_bytes() == before
+
+
 def test_disk_full_during_the_run(root, run, program, mpiexec, whole, tmp_path):
     """The file took its room when it was made: the run ends as if nothing had happened."""
     with mounted(tmp_path / "run" / "disk", "-t", "tmpfs", "-o", "size=4m", "tmpfs") as disk:
@@ -150,7 +164,7 @@ def test_quota_during_the_run(root, run, program, mpiexec, whole, tmp_path):
 def test_folder_that_is_a_file(root, run, tmp_path):
     (tmp_path / "out").write_text("precious")
     done = run(map_deck(root, tmp_path, file="out/map.h5"))
-    assert done.returncode == EXIT_INTERNAL
+    assert done.returncode == EXIT_DECK
     assert "out/map.h5" in done.stderr
     assert "Not a directory" in done.stderr
     assert (tmp_path / "out").read_text() == "precious"

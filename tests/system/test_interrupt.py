@@ -1,38 +1,37 @@
 """Runs that end early: drained by SIGUSR1 or killed; what was computed stays and the file ends the same."""
 
 import os
-import re
+import shutil
 import signal
 import subprocess
 import time
 
 import pytest
 import xarray
-
-EXIT_COMPLETE, EXIT_MISMATCH, EXIT_STOPPED = 0, 3, 75
-EPOCH = {"SOURCE_DATE_EPOCH": "1500000000"}
-STIFFNESSES = 6
+from jobs import EPOCH, EXIT_COMPLETE, EXIT_MISMATCH, EXIT_STOPPED, Job, map_deck
 
 
 @pytest.fixture
 def deck(root, tmp_path):
     """Six rows of the map of figure 9: a few seconds of work."""
-    text = (root / "input" / "paper" / "figure9.nml").read_text()
-    text = text.replace("results/figure9.h5", "map.h5")
-    text = re.sub(r"stiffness_count = \d+", f"stiffness_count = {STIFFNESSES}", text)
-    text = re.sub(r"max_periods\s*= \d+", "max_periods = 1000", text)
-    path = tmp_path / "map.nml"
-    path.write_text(text)
-    return path
+    return map_deck(root, tmp_path)
+
+
+@pytest.fixture(scope="module")
+def whole(root, program, mpiexec, tmp_path_factory):
+    """The file of a run that nothing disturbs."""
+    folder = tmp_path_factory.mktemp("whole")
+    with Job(program, mpiexec, map_deck(root, folder), ranks=2, folder=folder) as job:
+        assert job.wait() == EXIT_COMPLETE, job.output
+    return folder / "map.h5"
 
 
 @pytest.fixture
-def whole(run, deck, tmp_path):
-    """The file of a run that nothing disturbs."""
-    folder = tmp_path / "whole"
+def copy(whole, tmp_path):
+    """A copy of it, to run on."""
+    folder = tmp_path / "copy"
     folder.mkdir()
-    assert run(deck, ranks=2, folder=folder, environment=EPOCH).returncode == EXIT_COMPLETE
-    return folder / "map.h5"
+    return shutil.copy(whole, folder / "map.h5")
 
 
 def interrupt(program, mpiexec, deck, folder, number, after):
@@ -89,26 +88,26 @@ def test_kill_and_go_on(run, program, mpiexec, deck, whole, tmp_path, after):
     assert (folder / "map.h5").read_bytes() == whole.read_bytes()
 
 
-def test_other_deck_is_refused(run, deck, whole):
+def test_other_deck_is_refused(run, deck, copy):
     deck.write_text(deck.read_text().replace("damping_ratio  = 0.15", "damping_ratio  = 0.16"))
-    before = whole.read_bytes()
-    done = run(deck, folder=whole.parent)
+    before = copy.read_bytes()
+    done = run(deck, folder=copy.parent)
     assert done.returncode == EXIT_MISMATCH
     assert "damping_ratio" in done.stderr
-    assert whole.read_bytes() == before
+    assert copy.read_bytes() == before
 
 
-def test_finished_run_is_recognised(run, deck, whole):
-    before = whole.read_bytes()
-    done = run(deck, ranks=2, folder=whole.parent)
+def test_finished_run_is_recognised(run, deck, copy):
+    before = copy.read_bytes()
+    done = run(deck, ranks=2, folder=copy.parent)
     assert done.returncode == EXIT_COMPLETE
     assert "nothing to do" in done.stdout
-    assert whole.read_bytes() == before
+    assert copy.read_bytes() == before
 
 
-def test_fresh_starts_over(run, deck, whole):
-    before = whole.read_bytes()
-    done = run("--fresh", deck, ranks=2, folder=whole.parent, environment=EPOCH)
+def test_fresh_starts_over(run, deck, copy):
+    before = copy.read_bytes()
+    done = run("--fresh", deck, ranks=2, folder=copy.parent, environment=EPOCH)
     assert done.returncode == EXIT_COMPLETE
     assert "nothing to do" not in done.stdout
-    assert whole.read_bytes() == before
+    assert copy.read_bytes() == before

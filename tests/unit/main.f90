@@ -9,6 +9,7 @@ program unit_tests
    use test_deck, only: collect_deck
    use test_dense, only: collect_dense
    use test_equations, only: collect_equations
+   use test_forecast, only: collect_forecast
    use test_mesh, only: collect_mesh
    use test_motion, only: collect_motion
    use test_newmark, only: collect_newmark
@@ -49,6 +50,7 @@ program unit_tests
             new_testsuite('spectrum', collect_spectrum), &
             new_testsuite('recorder', collect_recorder), &
             new_testsuite('plan', collect_plan), &
+            new_testsuite('forecast', collect_forecast), &
             new_testsuite('steady', collect_steady), &
             new_testsuite('modal', collect_modal), &
             new_testsuite('exponential', collect_exponential), &

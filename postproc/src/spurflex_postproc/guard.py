@@ -1,9 +1,11 @@
 """Reads a file in another process first: the HDF5 library may crash or hang on a damaged one."""
 
+import contextlib
+import math
 import os
-import resource
 import select
 import signal
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,14 +16,15 @@ SECONDS = 30.0
 BYTES_PER_SECOND = 2e6
 """Slowest file system that larger files are granted."""
 MEMORY = 16 * 2**30
-"""Address space beside the eightfold of the file [bytes]; impossible sizes ask for more."""
+"""Address space beside that in use and eight times the file [bytes]; nonsense asks for more."""
 ENOUGH, TOO_LARGE = 0, 3
 
 
 def rehearse(path: Path, read: Callable[[Path], object]) -> None:
     """Let a child process read a file, and see whether it comes through.
 
-    What `read` itself raises is not told: it will raise it again.
+    What `read` itself raises is not told: it will raise it again. Where processes cannot be forked,
+    nothing is done; nor with other threads about, whose locks the child would wait for.
 
     Args:
         path: The file.
@@ -30,17 +33,20 @@ def rehearse(path: Path, read: Callable[[Path], object]) -> None:
     Raises:
         ResultError: If the child crashes, hangs or wants impossible amounts of memory.
     """
-    if not path.is_file():
+    if not path.is_file() or not hasattr(os, "fork") or threading.active_count() > 1:
         return
     size = path.stat().st_size
+    seconds = SECONDS + size / BYTES_PER_SECOND
     ends, begins = os.pipe()
     child = os.fork()
     if child == 0:
-        _read_and_leave(path, read, MEMORY + 8 * size)
+        # Without its parent nobody would end it.
+        signal.alarm(math.ceil(2.0 * seconds))
+        _read_and_leave(path, read, _address_space() + MEMORY + 8 * size)
     os.close(begins)
     try:
         # The end of the pipe shows when the child has ended.
-        ended, _, _ = select.select([ends], [], [], SECONDS + size / BYTES_PER_SECOND)
+        ended, _, _ = select.select([ends], [], [], seconds)
         if not ended:
             raise ResultError(f"{path}: damaged: reading it comes to no end")
         code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
@@ -56,14 +62,28 @@ def rehearse(path: Path, read: Callable[[Path], object]) -> None:
         raise ResultError(f"{path}: damaged: the HDF5 library cannot read it")
 
 
+def _address_space() -> int:
+    """Return the address space of this process [bytes]; 0 where the system does not tell."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[0])
+    except (OSError, ValueError, IndexError):
+        return 0
+    return pages * os.sysconf("SC_PAGE_SIZE")
+
+
 def _read_and_leave(path: Path, read: Callable[[Path], object], memory: int) -> None:
     """Be the child: read, and end without any of the parent's business."""
     code = ENOUGH
     try:
-        _, hard = resource.getrlimit(resource.RLIMIT_AS)
-        if hard == resource.RLIM_INFINITY or hard > memory:
-            resource.setrlimit(resource.RLIMIT_AS, (memory, hard))
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        # Only where there is `fork` is there this module.
+        import resource
+
+        # Some systems refuse limits; then the child has none.
+        with contextlib.suppress(OSError, ValueError):
+            _, hard = resource.getrlimit(resource.RLIMIT_AS)
+            if hard == resource.RLIM_INFINITY or hard > memory:
+                resource.setrlimit(resource.RLIMIT_AS, (memory, hard))
+            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         read(path)
     except MemoryError:
         code = TOO_LARGE
