@@ -34,6 +34,8 @@ module spurflex_io_log
       procedure :: begin
       !> Say how far the phase is, if it is time to.
       procedure :: progress
+      !> Whether it would do anything.
+      procedure :: is_due
       !> End a phase of work.
       procedure :: finish
       !> Seconds since the logger was made.
@@ -100,6 +102,32 @@ contains
       call self%say(text)
    end subroutine begin
 
+   !> Whether `progress` would do anything: what it is told costs time to find.
+   function is_due(self, done, total) result(due)
+      !> Logger.
+      class(logger), intent(in) :: self
+      !> Points done, and all of them.
+      integer(i8), intent(in) :: done, total
+      !> It would.
+      logical :: due
+
+      due = .false.
+      if (.not. self%active) return
+      due = is_half(self, done, total) .or. self%elapsed() - self%last >= progress_interval
+   end function is_due
+
+   !> Half of the points are done for the first time.
+   pure function is_half(self, done, total) result(half)
+      !> Logger.
+      class(logger), intent(in) :: self
+      !> Points done, and all of them.
+      integer(i8), intent(in) :: done, total
+      !> They are.
+      logical :: half
+
+      half = self%half < 0.0_wp .and. 2_i8*done >= total
+   end function is_half
+
    !> Say how far the phase is, if the last time is long enough ago.
    subroutine progress(self, done, total, remaining, remark)
       !> Logger.
@@ -114,9 +142,9 @@ contains
       real(wp) :: now
       character(len=:), allocatable :: left
 
-      if (.not. self%active) return
+      if (.not. self%is_due(done, total)) return
       now = self%elapsed()
-      if (self%half < 0.0_wp .and. 2_i8*done >= total) then
+      if (is_half(self, done, total)) then
          self%half = now
          self%estimate = remaining
       end if

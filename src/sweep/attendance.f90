@@ -12,8 +12,8 @@ module spurflex_sweep_attendance
 
    public :: sweep_attendant, outcome_text
 
-   !> Seconds between two looks at the messages.
-   real(wp), parameter :: interval = 0.5e-3_wp
+   !> Seconds between two looks at the messages: a rank that asks waits for half of it.
+   real(wp), parameter :: interval = 0.2e-3_wp
 
    !> The scheduler and the logger of a rank.
    type, extends(attendant) :: sweep_attendant
@@ -43,6 +43,7 @@ contains
       if (now - self%last < interval) return
       self%last = now
       call self%schedule%serve()
+      if (.not. self%log%is_due(sum(int(self%schedule%total, i8)), self%points)) return
       call self%log%progress(sum(int(self%schedule%total, i8)), self%points, self%schedule%remaining(), &
                              outcome_text(self%schedule%total))
    end subroutine attend_to_ranks

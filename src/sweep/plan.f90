@@ -1,9 +1,9 @@
 !> What has to be computed: the points of the grid that are missing, cut into chunks that are handed to ranks.
 !>
 !> A chunk is a tile of neighbouring speeds and support stiffnesses, so that its results are written in one piece and dear
-!> points, which lie together, fill the lanes of the processor's vectors. Soft supports, whose transients are long, come first:
-!> a slow chunk at the end would leave the other ranks idle. With the starts 'up' and 'down' each point begins where its
-!> neighbour ended, and a chunk is some whole rows side by side.
+!> points, which lie together, fill the lanes of the processor's vectors. With the starts 'up' and 'down' each point begins where
+!> its neighbour ended, and a chunk is some whole rows side by side. The list runs from the softest support to the stiffest; in
+!> which order its chunks are handed out is up to the forecast.
 module spurflex_sweep_plan
    use spurflex_base_kinds, only: i8, wp
    use spurflex_base_text, only: fixed_text, to_text
@@ -22,11 +22,15 @@ module spurflex_sweep_plan
    !> Points handed out at once at most: few enough to balance, enough to write in one go.
    integer, parameter :: largest_chunk = 256
 
-   !> Chunks that each rank should get at least, where there are enough points.
+   !> Chunks that each rank should get at least, where there are enough points: a dear one takes as long as 20 others. With fewer
+   !> and larger ones the dearest take longer than all that a rank has to do, with more and smaller ones a point costs more.
    integer, parameter :: chunks_per_rank = 64
 
    !> Points that a rank solves side by side: fewer in a chunk leave lanes empty.
    integer, parameter :: smallest_chunk = 8
+
+   !> Chunks that each rank should get even if they leave lanes empty: one alone takes as long as the dearest.
+   integer, parameter :: fewest_chunks = 2
 
    !> Neighbouring speeds of some neighbouring rows.
    type :: chunk_type
@@ -58,7 +62,7 @@ contains
       integer, intent(in) :: status(:)
       !> Number of ranks.
       integer, intent(in) :: ranks
-      !> The chunks, in the order in which they are handed out.
+      !> The chunks, lowest speed first.
       type(chunk_type), allocatable :: chunks(:)
 
       chunks = cut_rows(case, reshape(status, [size(status), 1]), ranks)
@@ -73,7 +77,7 @@ contains
       integer, intent(in) :: status(:, :)
       !> Number of ranks.
       integer, intent(in) :: ranks
-      !> The chunks, in the order in which they are handed out: softest support first.
+      !> The chunks, softest support first.
       type(chunk_type), allocatable :: chunks(:)
 
       chunks = cut_rows(case, status, ranks)
@@ -94,7 +98,7 @@ contains
       integer :: missing, length, height, width, n, first, rows, row, speed
 
       missing = count(status == status_missing)
-      length = max(1, min(smallest_chunk, missing/ranks), min(largest_chunk, missing/(ranks*chunks_per_rank)))
+      length = max(1, min(smallest_chunk, missing/(ranks*fewest_chunks)), min(largest_chunk, missing/(ranks*chunks_per_rank)))
       width = max(1, min(nint(sqrt(real(length))), size(status, 1)))
       height = max(1, min(length/width, size(status, 2)))
       width = max(1, min(length/height, size(status, 1)))

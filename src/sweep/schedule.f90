@@ -1,11 +1,11 @@
 !> Which rank gets which chunk.
 !>
-!> Rank 0 hands out the chunks in the order of its forecast, which learns from the times of those that are done. It works too and serves the others between its own periods; point-to-point messages only. Every other rank always
-!> has one request on its way, so that the answer is there when it is needed.
+!> Rank 0 hands out the chunks in the order of its forecast, which learns from the times of those that are done. It works too
+!> and serves the others between its own periods; point-to-point messages only. Nobody asks for a chunk before the last one is
+!> done: one that is kept ready by a rank at work on a dear chunk can be done by no other, and may be dear itself.
 module spurflex_sweep_schedule
-   use mpi_f08, only: MPI_Comm, MPI_Request, MPI_Status, MPI_COMM_NULL, MPI_REQUEST_NULL, MPI_INTEGER8, MPI_ANY_SOURCE, &
-      MPI_ANY_TAG, MPI_STATUS_IGNORE, mpi_comm_rank, mpi_comm_size, mpi_iprobe, mpi_probe, mpi_irecv, mpi_recv, mpi_send, &
-      mpi_wait
+   use mpi_f08, only: MPI_Comm, MPI_Status, MPI_COMM_NULL, MPI_INTEGER8, MPI_ANY_SOURCE, &
+      MPI_ANY_TAG, MPI_STATUS_IGNORE, mpi_comm_rank, mpi_comm_size, mpi_iprobe, mpi_probe, mpi_recv, mpi_send
    use spurflex_base_clock, only: steady_seconds
    use spurflex_base_kinds, only: i8, wp
    use spurflex_sweep_forecast, only: forecast_type, new_forecast
@@ -40,10 +40,6 @@ module spurflex_sweep_schedule
       !> The chunk in hand; the chunk that was done last, as long as rank 0 has not been told, and its time [s].
       integer :: in_hand = no_chunk, last = no_chunk
       real(wp) :: last_seconds = 0.0_wp
-      !> Other ranks: no chunk is left; the answer on its way.
-      logical :: exhausted = .false.
-      type(MPI_Request) :: pending = MPI_REQUEST_NULL
-      integer(i8), allocatable :: answer(:)
       !> This rank's time.
       type(timekeeper), pointer :: keeper => null()
       !> Points finished since the last message, by outcome.
@@ -67,7 +63,7 @@ contains
 
    !> Begin to hand out chunks. All ranks call this together.
    subroutine new_scheduler(self, comm, chunks, keeper)
-      !> The scheduler; stays where it is until `finish`, for a message may be on its way to it.
+      !> The scheduler.
       type(scheduler), intent(inout) :: self
       !> The ranks.
       type(MPI_Comm), intent(in) :: comm
@@ -85,11 +81,8 @@ contains
       self%ended = 0
       self%in_hand = no_chunk
       self%last = no_chunk
-      self%exhausted = .false.
       self%finished = 0
       self%total = 0
-      if (.not. allocated(self%answer)) allocate (self%answer(answer_length))
-      if (self%rank /= 0) call request(self)
    end subroutine new_scheduler
 
    !> Ask for a chunk; waits for the answer.
@@ -101,6 +94,8 @@ contains
       !> There is one.
       logical, intent(out) :: available
 
+      integer(i8) :: answer(answer_length)
+
       call self%keeper%end_chunk()
       self%last = self%in_hand
       self%last_seconds = self%keeper%latest
@@ -110,15 +105,15 @@ contains
          call self%serve()
          call hand_out(self, chunk)
          available = chunk /= no_chunk
-      else if (.not. self%exhausted) then
-         call mpi_wait(self%pending, MPI_STATUS_IGNORE)
-         chunk = int(self%answer(1))
-         self%keeper%longest = max(self%keeper%longest, real(self%answer(2), wp)/per_second)
+      else
+         call mpi_send(message_of(self), request_length, MPI_INTEGER8, 0, tag_request, self%comm)
+         call forget(self)
+         call mpi_recv(answer, answer_length, MPI_INTEGER8, 0, tag_assign, self%comm, MPI_STATUS_IGNORE)
+         chunk = int(answer(1))
+         self%keeper%longest = max(self%keeper%longest, real(answer(2), wp)/per_second)
          available = chunk /= no_chunk
          ! A chunk that came too late is left for the next run.
          if (available) available = .not. self%keeper%must_stop()
-         self%exhausted = .not. available
-         if (available) call request(self)
       end if
       self%in_hand = merge(chunk, no_chunk, available)
       if (available) call self%keeper%begin_chunk()
@@ -182,6 +177,10 @@ contains
       call learn(self, message)
       if (status%MPI_TAG == tag_last) then
          self%ended = self%ended + 1
+         ! A rank that ends while there are chunks was told to stop: so are all.
+         if (.not. self%forecast%is_exhausted() .and. len(self%keeper%reason) == 0) then
+            self%keeper%reason = 'as another rank was asked to stop'
+         end if
       else
          call hand_out(self, chunk)
          answer = [int(chunk, i8), microseconds(self%keeper%longest)]
@@ -232,16 +231,6 @@ contains
       if (self%keeper%must_stop()) return
       call self%forecast%next(chunk)
    end subroutine hand_out
-
-   !> Other ranks: send a request, with what was finished since the last one, and be ready for the answer.
-   subroutine request(self)
-      !> Scheduler.
-      class(scheduler), intent(inout) :: self
-
-      call mpi_irecv(self%answer, answer_length, MPI_INTEGER8, 0, tag_assign, self%comm, self%pending)
-      call mpi_send(message_of(self), request_length, MPI_INTEGER8, 0, tag_request, self%comm)
-      call forget(self)
-   end subroutine request
 
    !> What a rank tells rank 0.
    pure function message_of(self) result(message)

@@ -134,7 +134,8 @@ def fits(length, shape):
 def least_missing(length):
     """Fewest missing points of which the program on one rank makes tiles of this size."""
     now = schedule.constants_of_plan()
-    return length if length <= now.smallest_chunk else length * now.chunks_per_rank
+    each = now.fewest_chunks if length <= now.smallest_chunk else now.chunks_per_rank
+    return length * each
 
 
 def every_point(shape):

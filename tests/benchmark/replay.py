@@ -2,7 +2,8 @@
 
 Measures the cost of every point on one rank, spreads the costs to a map of 10^6 points, and replays
 the program's own rule of handing out chunks (schedule.py): rigid twins first, then, when all are
-there, the flexible points. Writes replay.json and the figures replay and replay_constants.
+there, the flexible points; of both a pilot, then what seems dearest. Writes replay.json and
+the figures replay and replay_constants.
 """
 
 import sys
@@ -13,7 +14,7 @@ import harness
 import numpy as np
 import schedule
 from harness import style
-from schedule import Constants, Machine
+from schedule import Machine
 
 TOLERANCE = 1e-6
 PHASES = ("rigid", "flexible")  # in their order
@@ -66,7 +67,8 @@ class Map:
         """Seconds of one phase with chunks of a length."""
         if (part, length, ranks) not in self.known:
             chunks = self.chunks(part, length)
-            self.known[part, length, ranks] = schedule.replay(chunks, ranks, self.machine)
+            order = schedule.forecast(length, self.costs.least(part).shape)
+            self.known[part, length, ranks] = schedule.replay(chunks, ranks, self.machine, order)
         return self.known[part, length, ranks]
 
     def seconds(self, constants, ranks):
@@ -89,13 +91,14 @@ class Map:
         """Efficiencies of other rules on so many ranks."""
         lengths = self.lengths(constants, ranks)
         rigid, flexible = (self.chunks(part, lengths[part]) for part in PHASES)
-        firm = self.costs.at("flexible", lengths["flexible"])[::-1]
         singles = (self.chunks(part, 1) for part in PHASES)
         rules = {
-            "stiffest support first": (rigid, schedule.cut(firm, lengths["flexible"])),
-            "dearest chunk first": tuple(np.sort(c)[::-1] for c in (rigid, flexible)),
+            "softest support first": (rigid, flexible),
+            "dearest chunk first, as if known before": tuple(np.sort(c)[::-1] for c in (rigid, flexible)),
             "dearest point first, chunks of one": tuple(np.sort(c)[::-1] for c in singles),
-            "flexible points do not wait for the rigid twins": (np.concatenate([rigid, flexible]),),
+            "the same, flexible points do not wait for the rigid twins": (
+                np.sort(np.concatenate([rigid, flexible]))[::-1],
+            ),
         }
         one = sum(self.seconds(constants, 1))
         return {
@@ -118,6 +121,7 @@ class Map:
                     "chunk_length": lengths,
                     "tile": schedule.tile(lengths["flexible"], self.costs.flexible.shape[1:]),
                     "chunks": int(chunks.size),
+                    "cost_of_small_chunks": float(chunks.sum()) / alone["flexible"],
                     "rigid_seconds": rigid,
                     "flexible_seconds": flexible,
                     "seconds": rigid + flexible,
@@ -145,7 +149,7 @@ def try_constants(maps, all_ranks, now):
     tried = []
     for largest in sorted({*LARGEST, now.largest_chunk}):
         for per_rank in sorted({*PER_RANK, now.chunks_per_rank}):
-            constants = Constants(largest, per_rank, now.smallest_chunk)
+            constants = replace(now, largest_chunk=largest, chunks_per_rank=per_rank)
             each = {m.name: {n: m.of_bound(constants, n) for n in all_ranks} for m in maps}
             values = [value for by_ranks in each.values() for value in by_ranks.values()]
             tried.append(

@@ -15,6 +15,14 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 PLAN = ROOT / "src" / "sweep" / "plan.f90"
 FORECAST = ROOT / "src" / "sweep" / "forecast.f90"
+FORECAST_PARAMETERS = (
+    "pilot_share",
+    "pilot_skew",
+    "speed_step",
+    "row_step",
+    "classes_per_octave",
+    "revision_share",
+)
 ATTENDANCE = ROOT / "src" / "sweep" / "attendance.f90"
 
 
@@ -25,11 +33,13 @@ class Constants:
     largest_chunk: int
     chunks_per_rank: int
     smallest_chunk: int = 8
+    fewest_chunks: int = 2
 
     def length(self, missing, ranks):
         """Points that a chunk is meant to have."""
         wanted = min(self.largest_chunk, missing // (ranks * self.chunks_per_rank))
-        return max(1, min(self.smallest_chunk, missing // ranks), wanted)
+        least = min(self.smallest_chunk, missing // (ranks * self.fewest_chunks))
+        return max(1, least, wanted)
 
 
 @dataclass(frozen=True)
@@ -94,13 +104,14 @@ class InOrder:
 
 
 class Forecast:
-    """The order of the program: a pilot, then dearest first. Mirrors src/sweep/forecast.f90 for a grid of tiles."""
+    """A pilot, then dearest first. Mirrors src/sweep/forecast.f90 for a grid of tiles."""
 
     def __init__(self, shape, points):
         """`shape`: tiles in both directions (row, speed); `points` of each tile, flat."""
-        names = ("pilot_share", "pilot_skew", "speed_step", "row_step", "classes_per_octave")
-        share, skew, *steps, self.per_octave = (int(parameter(FORECAST, name)) for name in names)
-        self.speed_step, self.row_step = steps
+        value = {name: int(parameter(FORECAST, name)) for name in FORECAST_PARAMETERS}
+        share, skew, self.per_octave = (value[n] for n in ("pilot_share", "pilot_skew", "classes_per_octave"))
+        self.speed_step, self.row_step = value["speed_step"], value["row_step"]
+        self.revision_share = value["revision_share"]
         row, speed = np.indices(shape)
         in_pilot = ((speed + skew * row) % share == 0).reshape(-1)
         numbers = np.arange(in_pilot.size)
@@ -128,14 +139,25 @@ class Forecast:
 
     def revise(self):
         """Put the chunks that are neither handed out nor in the pilot in order."""
-        self.next_revision = 2 * max(self.known, 1)
         # Before the pilot is handed out, the program changes only its estimate of the time.
         self.ordered = self.handed_out >= self.pilot
+        step = self.known // self.revision_share if self.ordered else self.known
+        self.next_revision = self.known + step + 1
         if not self.ordered or self.known == 0:
             return
-        expected = self.points * (self.seconds / self.points)[self.nearest()]
+        expected = self.points * self.rates()
         rest = self.order[self.handed_out :]
         self.order[self.handed_out :] = rest[dearest_first(expected[rest], self.per_octave)]
+
+    def rates(self):
+        """What a point of each tile costs: the mean over what is known nearest to it and its neighbours."""
+        here = (self.seconds / self.points)[self.nearest()].reshape(self.shape)
+        for axis in (1, 0):
+            last = self.shape[axis] - 1
+            at = np.arange(last + 1)
+            below, above = (here.take(np.clip(at + step, 0, last), axis) for step in (-1, 1))
+            here = (below + here + above) / 3.0
+        return here.reshape(-1)
 
     def nearest(self):
         """For each tile the nearest one of which the time is known."""
@@ -170,10 +192,9 @@ def forecast(length, shape):
 def replay(costs, ranks, machine, order=None):
     """Time [s] until all ranks have done chunks of these costs, handed out in an order: that of the list.
 
-    Mirrors src/sweep/schedule.f90. Every rank but rank 0 has one request on its way: when it begins a
-    chunk it asks for the next one, and tells the time of the one before. Rank 0 works too; it answers the
-    requests that have come when it takes a chunk itself and every `attendance` seconds in between, and at
-    once when no chunk is left.
+    Mirrors src/sweep/schedule.f90. A rank that has done a chunk tells its time and asks for the next one.
+    Rank 0 works too; it answers the requests that have come when it takes a chunk itself and every
+    `attendance` seconds in between, and at once when no chunk is left.
     """
     costs = [float(c) + machine.write for c in costs]
     order = InOrder(len(costs)) if order is None else order
@@ -182,7 +203,7 @@ def replay(costs, ranks, machine, order=None):
         return sum(costs)
     free = [0.0] * ranks
     requests = [(machine.latency, r) for r in range(1, ranks)]  # sorted, so a heap
-    in_hand = [[] for _ in range(ranks)]  # chunks of which the time is not told yet, in order
+    in_hand = [None] * ranks
     given = 0
     clock = 0.0
     left = 0.0  # work that rank 0 still has on its chunk
@@ -193,19 +214,15 @@ def replay(costs, ranks, machine, order=None):
         while requests and requests[0][0] <= clock:
             rank = requests[0][1]
             clock += machine.service
-            # It came when the last of these chunks was begun.
-            while len(in_hand[rank]) > 1:
-                done = in_hand[rank].pop(0)
-                order.note(done, costs[done])
+            if in_hand[rank] is not None:
+                order.note(in_hand[rank], costs[in_hand[rank]])
+            free[rank] = clock + machine.latency
             if given < chunks:
-                begin = max(free[rank], clock + machine.latency)
-                chunk = order.next()
-                in_hand[rank].append(chunk)
-                free[rank] = begin + costs[chunk]
+                in_hand[rank] = order.next()
+                free[rank] += costs[in_hand[rank]]
                 given += 1
-                heapq.heapreplace(requests, (begin + machine.latency, rank))
+                heapq.heapreplace(requests, (free[rank] + machine.latency, rank))
             else:
-                free[rank] = max(free[rank], clock + machine.latency)
                 heapq.heappop(requests)
         # It goes on with its chunk, or takes one.
         if left <= 0.0:
@@ -214,10 +231,10 @@ def replay(costs, ranks, machine, order=None):
                     break
                 clock = max(clock, requests[0][0])
                 continue
-            for done in in_hand[0]:
-                order.note(done, costs[done])
-            in_hand[0] = [order.next()]
-            left = costs[in_hand[0][0]]
+            if in_hand[0] is not None:
+                order.note(in_hand[0], costs[in_hand[0]])
+            in_hand[0] = order.next()
+            left = costs[in_hand[0]]
             given += 1
         # It works until it looks and finds something, or until its chunk is done.
         look = clock + left

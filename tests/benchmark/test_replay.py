@@ -7,7 +7,20 @@ import pytest
 from costs import Costs, fits, least_missing, sets_of, sets_of_every_other, tiles_of
 from harness import paths_in
 from replay import refined
-from schedule import PLAN, Constants, Machine, constants_of_plan, cut, lower_bound, replay, tile
+from schedule import (
+    FORECAST,
+    PLAN,
+    Constants,
+    Forecast,
+    Machine,
+    constants_of_plan,
+    cut,
+    dearest_first,
+    forecast,
+    lower_bound,
+    replay,
+    tile,
+)
 
 FREE = Machine(latency=0.0, service=0.0, attendance=0.0, write=0.0)
 SHORT = 1e-9  # a latency that only says who asks first
@@ -36,9 +49,9 @@ def test_giant_chunk_at_the_end():
     assert replay([1.0] * 100 + [50.0], 2, NEAR) == pytest.approx(50.0 + 50.0, rel=1e-6)
 
 
-def test_giant_chunk_keeps_the_next_one_waiting():
-    # Rank 1 begins the giant chunk and has asked for the next one already, which nobody else can do.
-    assert replay([1.0, 50.0, 1.0] + [1.0] * 20, 2, NEAR) == pytest.approx(51.0, rel=1e-6)
+def test_giant_chunk_keeps_no_other_waiting():
+    # Rank 1 has the giant chunk and asks for no other before it is done.
+    assert replay([1.0, 50.0, 1.0] + [1.0] * 20, 2, NEAR) == pytest.approx(50.0, rel=1e-6)
 
 
 def test_giant_chunk_of_rank_0():
@@ -54,19 +67,18 @@ def test_nothing_to_do():
     assert replay([], 4, NEAR) == pytest.approx(0.0, abs=1e-6)
 
 
-def test_latency_is_hidden_behind_a_longer_chunk():
+def test_a_round_trip_before_every_chunk():
     machine = Machine(latency=0.1, service=0.0, attendance=0.0, write=0.0)
-    # Rank 1 starts a round trip late; its last answer, that there is nothing left, takes another one.
-    time = replay([1.0] * 20, 2, machine)
-    assert 10.0 <= time <= 10.0 + 4 * machine.latency
+    # Rank 1 does 10 chunks in 12 s, rank 0 does 11 in 11 s and takes the last one too.
+    assert replay([1.0] * 22, 2, machine) == pytest.approx(12.0 + 3 * machine.latency, abs=0.1 + 1e-6)
 
 
 def test_chunks_shorter_than_a_round_trip_wait_for_it():
     machine = Machine(latency=1.0, service=0.0, attendance=0.0, write=0.0)
-    # Rank 0 does a chunk every 0.1 s, rank 1 gets one every 2 s: 210 in 20 s. At the end a request, its
+    # Rank 0 does a chunk every 0.1 s, rank 1 one every 2.1 s: 220 in 21 s. At the end a request, its
     # answer and the message that rank 1 has ended may still have to travel.
-    time = replay([0.1] * 210, 2, machine)
-    assert 20.0 - 0.1 <= time <= 20.0 + 0.1 + 3 * machine.latency
+    time = replay([0.1] * 220, 2, machine)
+    assert 21.0 - 0.1 <= time <= 21.0 + 0.1 + 3 * machine.latency
 
 
 def test_rank_0_answers_only_when_it_looks():
@@ -132,18 +144,20 @@ def test_shape_of_tiles(length, shape, expected):
 
 
 def test_length_of_chunks():
-    constants = Constants(largest_chunk=128, chunks_per_rank=24, smallest_chunk=8)
+    constants = Constants(largest_chunk=128, chunks_per_rank=24, smallest_chunk=8, fewest_chunks=2)
     assert constants.length(51961, 2) == 128
     assert constants.length(51961, 256) == 8
     assert constants.length(10**6, 1024) == 40
-    assert constants.length(2500, 1024) == 2
+    assert constants.length(2500, 1024) == 1
+    assert constants.length(2500, 256) == 4
     assert constants.length(571, 1024) == 1
 
 
 def test_the_plan_still_has_the_rule_that_is_mirrored():
     text = re.sub(r"\s+", "", PLAN.read_text())
     for line in (
-        "length=max(1,min(smallest_chunk,missing/ranks),min(largest_chunk,missing/(ranks*chunks_per_rank)))",
+        "length=max(1,min(smallest_chunk,missing/(ranks*fewest_chunks)),"
+        "min(largest_chunk,missing/(ranks*chunks_per_rank)))",
         "width=max(1,min(nint(sqrt(real(length))),size(status,1)))",
         "height=max(1,min(length/width,size(status,2)))",
         "width=max(1,min(length/height,size(status,1)))",
@@ -156,6 +170,78 @@ def test_the_plan_still_has_the_rule_that_is_mirrored():
     constants = constants_of_plan()
     assert constants.largest_chunk >= constants.smallest_chunk >= 1
     assert constants.chunks_per_rank >= 1
+
+
+def handed_out(order, costs):
+    """All chunks in the order of a forecast that hears of each at once."""
+    chunks = []
+    for _ in costs:
+        chunks.append(order.next())
+        order.note(chunks[-1], costs[chunks[-1]])
+    return chunks
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (9, 1), (6, 36), (25, 40)])
+def test_every_chunk_is_handed_out_once_and_the_pilot_first(shape):
+    costs = np.random.default_rng(5).lognormal(0.0, 1.5, size=shape[0] * shape[1])
+    order = Forecast(shape, np.full(costs.size, 16))
+    chunks = handed_out(order, costs)
+    assert sorted(chunks) == list(range(costs.size))
+    row, speed = np.divmod(chunks[: order.pilot], shape[1])
+    assert not ((speed + 3 * row) % 8).any()
+    assert chunks[: order.pilot] == sorted(chunks[: order.pilot])
+
+
+def test_a_dear_band_comes_after_the_pilot():
+    shape = (16, 40)
+    costs = np.ones(shape)
+    costs[:, 20:24] = 50.0
+    costs = costs.reshape(-1)
+    order = Forecast(shape, np.full(costs.size, 16))
+    rest = costs[handed_out(order, costs)[order.pilot :]]
+    dear = int((rest > 1.0).sum())
+    assert (rest[: dear // 2] > 1.0).all()
+    assert (rest[2 * dear :] == 1.0).all()
+
+
+def test_a_forecast_beats_the_list():
+    shape, ranks = (64, 64), 8
+    costs = np.ones(shape)
+    costs[63:, 55:] = 40.0
+    costs = costs.reshape(-1)
+    first = replay(costs, ranks, NEAR, Forecast(shape, np.full(costs.size, 16)))
+    assert first < 0.95 * replay(costs, ranks, NEAR)
+    assert lower_bound(costs, ranks) * (1 - 1e-9) <= first < 1.02 * lower_bound(costs, ranks)
+
+
+def test_equal_costs_keep_the_order_of_the_list():
+    for cost in (0.0, 2.0):
+        order = Forecast((8, 16), np.full(128, 4))
+        chunks = handed_out(order, np.full(128, cost))
+        assert chunks[order.pilot :] == sorted(chunks[order.pilot :])
+
+
+def test_dearest_first_by_classes():
+    assert dearest_first(np.array([1.0, 8.0, 0.99, 0.0, 2.0]), 8).tolist() == [1, 4, 0, 2, 3]
+    assert dearest_first(np.zeros(3), 8).tolist() == [0, 1, 2]
+    assert dearest_first(np.zeros(0), 8).tolist() == []
+
+
+def test_forecast_of_a_grid():
+    order = forecast(8, (5, 7))
+    assert order.shape == (3, 2)
+    assert order.points.tolist() == [8, 6, 8, 6, 4, 3]
+
+
+def test_the_forecast_still_has_the_rule_that_is_mirrored():
+    text = re.sub(r"\s+", "", FORECAST.read_text())
+    for line in (
+        "modulo(i-1+pilot_skew*(j-1),pilot_share)==0",
+        "classes=24*classes_per_octave",
+        "self%next_revision=self%known+merge(self%known/revision_share,self%known,self%is_ordered)+1",
+        "here=(here([1,(i,i=1,columns-1)],:)+here+here([(i,i=2,columns),columns],:))/3.0_wp",
+    ):
+        assert line in text, f"no {line} in src/sweep/forecast.f90: change Forecast in schedule.py too"
 
 
 @pytest.mark.parametrize("length", [8, 16, 32, 64, 128])
