@@ -48,6 +48,8 @@ contains
       character(len=:), allocatable :: text
       integer :: rank, length(1)
 
+      ! Whoever asks for a drain may do so before the first point.
+      call watch_for_drain()
       call mpi_comm_rank(comm, rank)
       if (rank == 0) call read_deck(file, case, error)
       call share_error(comm, error)
@@ -58,6 +60,7 @@ contains
       if (rank == 0) text = case%resolved
       call mpi_bcast(text, length(1), MPI_CHARACTER, 0, comm)
       if (rank /= 0) call parse_deck(text, file, case, error)
+      call share_error(comm, error)
       ! What concerns one run only is no part of the resolved deck.
       call mpi_bcast(case%sweep%wall_clock_limit, 1, MPI_DOUBLE_PRECISION, 0, comm)
    end subroutine share_case
@@ -87,7 +90,6 @@ contains
 
       code = exit_complete
       call use_one_thread()
-      call watch_for_drain()
       call survive_size_limit()
       call mpi_comm_size(comm, ranks)
       call new_timekeeper(keeper, case, comm, log%elapsed())
