@@ -6,6 +6,10 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+PAPER_STIFFNESS = 1.75e8
+"""Support stiffness with which the published flexible curve is computed [N/m]. The article prints
+2.5e5; this one fits its peaks (`spurflex-identify`)."""
+
 
 @dataclass(frozen=True)
 class PublishedCurve:

@@ -53,12 +53,45 @@ class CrestLine:
         Returns:
             Speeds [rev/min], same shape; NaN if fewer than two crests are known.
         """
-        known = np.isfinite(self.speed)
         wanted = np.asarray(stiffness, dtype=float)
-        if np.count_nonzero(known) < 2:
-            return np.full(wanted.shape, np.nan)
-        slope, level = np.polyfit(np.log(self.stiffness[known]), np.log(self.speed[known]), 1)
+        slope, level = self._straight()
         return np.asarray(np.exp(level + slope * np.log(wanted)))
+
+    def stiffness_at(self, speed: float) -> float:
+        """Extend the line in the same way to a speed.
+
+        Args:
+            speed: [rev/min].
+
+        Returns:
+            Support stiffness [N/m]; NaN if fewer than two crests are known.
+        """
+        slope, level = self._straight()
+        return float(np.exp((np.log(speed) - level) / slope))
+
+    def between(self, stiffness: float) -> float:
+        """Interpolate between the rows next to a stiffness, in logarithms.
+
+        Args:
+            stiffness: Support stiffness [N/m].
+
+        Returns:
+            Speed of the crest [rev/min]; NaN where a row next to it lacks the crest.
+        """
+        x = np.log(self.stiffness)
+        above = min(max(int(np.searchsorted(x, np.log(stiffness))), 1), len(x) - 1)
+        near = slice(above - 1, above + 1)
+        if not x[near][0] <= np.log(stiffness) <= x[near][1]:
+            return float("nan")
+        return float(np.exp(np.interp(np.log(stiffness), x[near], np.log(self.speed[near]))))
+
+    def _straight(self) -> tuple[float, float]:
+        """Fit a straight line in logarithms: slope and level, NaN without two crests."""
+        known = np.isfinite(self.speed)
+        if np.count_nonzero(known) < 2:
+            return float("nan"), float("nan")
+        slope, level = np.polyfit(np.log(self.stiffness[known]), np.log(self.speed[known]), 1)
+        return float(slope), float(level)
 
 
 def crest_line(

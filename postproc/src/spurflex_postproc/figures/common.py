@@ -13,9 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from spurflex_postproc import style
 from spurflex_postproc.layout import STIFFNESS, ResultError
-
-PAPER_STIFFNESS = 2.5e8
-"""Support stiffness of the published flexible curve [N/m]."""
+from spurflex_postproc.published import PAPER_STIFFNESS
 
 SPEED_LABEL = "rotating speed $n$ (rev/min)"
 AMPLITUDE_LABEL = "amplitude of $y_1$ (µm)"

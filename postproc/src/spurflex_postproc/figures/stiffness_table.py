@@ -39,10 +39,9 @@ def map_table(
     Returns:
         Lines of text.
     """
-    row = int(np.argmin(np.abs(np.log(stiffness / PAPER_STIFFNESS))))
-    start = crest.speed[row]
+    start = crest.between(PAPER_STIFFNESS)
     rows = [
-        (f"crest at {stiffness[row]:.3g} N/m", [told.crest], [start] if start > 0 else []),
+        (f"crest at {PAPER_STIFFNESS:.3g} N/m", [told.crest], [start] if start > 0 else []),
     ]
     low = speed < told.flat[0]
     peaks = [

@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spurflex_postproc.identify.fit import COARSE, LOW
+from spurflex_postproc.identify.fit import COARSE
 from spurflex_postproc.identify.misfit import Feature, curve_misfit
 from spurflex_postproc.identify.program import Program
+from spurflex_postproc.identify.support import LOW
 from spurflex_postproc.identify.unknowns import Unknowns
 
 Reals = NDArray[np.float64]

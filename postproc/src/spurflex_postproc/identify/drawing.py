@@ -31,15 +31,17 @@ LOOKS = (
     (style.PURPLE, "<"),
     (style.VERMILION, "P"),
     (style.YELLOW, "^"),
+    (style.NAVY, "h"),
 )
 """Colour and marker of each hypothesis."""
-SLICE_PHASE, SLICE_MASS = 8.0, 0.04
-"""Largest distance of a fit from a map on which it is marked: phase [deg], mesh mass (fraction)."""
+SLICE_PHASE, SLICE_MASS, SLICE_STIFFNESS, SLICE_OFFSET = 8.0, 0.04, 0.02, 0.1
+"""Largest distance of a fit from a map on which it is marked: phase [deg]; mesh mass, k_M and l_o
+(fractions)."""
 OUTLINE = withStroke(linewidth=1.6, foreground="white", alpha=0.8)
 
 
 def draw(maps: Landscape, fits: Sequence[Fit], best: Fit) -> Figure:
-    """Draw three maps of the misfit and the deviations by feature.
+    """Draw four maps of the misfit and the deviations by feature.
 
     Args:
         maps: The maps around the best fit.
@@ -49,20 +51,24 @@ def draw(maps: Landscape, fits: Sequence[Fit], best: Fit) -> Figure:
     Returns:
         The figure.
     """
-    figure = Figure(figsize=style.size(style.DOUBLE, 150), layout="constrained")
-    upper, lower = figure.subfigures(2, 1, height_ratios=[1.0, 1.15])
-    axes = upper.subplots(1, 3)
+    figure = Figure(figsize=style.size(style.DOUBLE, 190), layout="constrained")
+    upper, lower = figure.subfigures(2, 1, height_ratios=[1.5, 1.15])
+    axes = list(upper.subplots(2, 2).flat)
     rigid = "mean mesh force $F$ (N)"
-    panels: tuple[tuple[Map, str, str, float], ...] = (
-        (maps.mass, rigid, r"mesh mass $m_\mathrm{t}$ (kg)", 1.0),
-        (maps.phase, rigid, "phase of the error (deg)", 1.0),
-        (maps.support, r"$l_\mathrm{o}$ (mm)", r"$l_\mathrm{x}$ (mm)", 1e3),
+    turning = r"$k_\mathrm{M} l_\mathrm{x}^2$ (MN m)"
+    panels: tuple[tuple[Map, str, str, tuple[float, float]], ...] = (
+        (maps.mass, rigid, r"mesh mass $m_\mathrm{t}$ (kg)", (1.0, 1.0)),
+        (maps.phase, rigid, "phase of the error (deg)", (1.0, 1.0)),
+        (maps.support, r"$l_\mathrm{o}$ (mm)", r"$l_\mathrm{x}$ (mm)", (1e3, 1e3)),
+        (maps.stiffness, r"$k_\mathrm{M}$ ($10^8$ N/m)", turning, (1e-8, 1e-6)),
     )
     phase = (best.unknowns.error_phase + 180) % 360 - 180
     titles = (
         f"a  rigid, phase {phase:.0f} deg",
         rf"b  rigid, $m_\mathrm{{t}}$ = {best.unknowns.mesh_mass:.2f} kg",
-        "c  flexible, peaks",
+        rf"c  flexible, peaks, $k_\mathrm{{M}}$ = {1e-8 * best.unknowns.support_stiffness:.3g}"
+        r"$\times 10^8$ N/m",
+        rf"d  flexible, peaks, $l_\mathrm{{o}}$ = {1e3 * best.unknowns.gear_offset:.0f} mm",
     )
     mesh = None
     for panel, (values, x, y, unit), title in zip(axes, panels, titles, strict=True):
@@ -77,16 +83,19 @@ def draw(maps: Landscape, fits: Sequence[Fit], best: Fit) -> Figure:
             _mark(axes[0], one.mesh_force, one.mesh_mass, look)
         if abs(one.mesh_mass / best.unknowns.mesh_mass - 1) < SLICE_MASS:
             _mark(axes[1], one.mesh_force, turn, look)
-        _mark(axes[2], 1e3 * one.gear_offset, 1e3 * one.support_offset, look)
+        if abs(one.stiffness_factor / best.unknowns.stiffness_factor - 1) < SLICE_STIFFNESS:
+            _mark(axes[2], 1e3 * one.gear_offset, 1e3 * one.support_offset, look)
+        if abs(one.gear_offset / best.unknowns.gear_offset - 1) < SLICE_OFFSET:
+            _mark(axes[3], 1e-8 * one.support_stiffness, 1e-6 * one.turning_stiffness, look)
     bar = upper.colorbar(mesh, ax=axes, extend="max", pad=0.01, aspect=30)
     bar.set_label("misfit (allowed deviations)")
     _deviations(lower.subplots(), fits)
     return figure
 
 
-def _map(axes: Axes, values: Map, unit: float) -> Any:
+def _map(axes: Axes, values: Map, unit: tuple[float, float]) -> Any:
     """Draw one map with its contours; limits stay those of the map."""
-    x, y = unit * values.x, unit * values.y
+    x, y = unit[0] * values.x, unit[1] * values.y
     mesh = axes.pcolormesh(
         edges(x),
         edges(y),
@@ -145,7 +154,7 @@ def _deviations(axes: Axes, fits: Sequence[Fit]) -> None:
     axes.set_xlim(-WIDEST, WIDEST)
     axes.tick_params(axis="y", length=0)
     axes.set_xlabel("deviation from the published speed (%); larger ones stand at the border")
-    axes.set_title("d  every feature", loc="left", fontweight="bold")
+    axes.set_title("e  every feature", loc="left", fontweight="bold")
     handles = [
         Line2D([], [], ls="none", marker=look[1], ms=4, color=look[0], label=fit.hypothesis.key)
         for fit, look in zip(fits, LOOKS, strict=False)

@@ -1,7 +1,7 @@
 """Fits one hypothesis to the published features, with the program itself."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from spurflex_postproc.identify.linear import MeanSystem
 from spurflex_postproc.identify.misfit import Feature, curve_misfit, misfit
 from spurflex_postproc.identify.program import Program
 from spurflex_postproc.identify.search import compass
+from spurflex_postproc.identify.support import SupportFit, fit_stiffness, nearest_agreeing
 from spurflex_postproc.identify.unknowns import Unknowns
 from spurflex_postproc.published import published_curve
 
@@ -29,8 +30,6 @@ COARSE = {
     "measured_periods": "100",
 }
 """Deck of the search in the rigid features."""
-LOW = {**COARSE, "speed_first": "300.0", "speed_last": "2200.0", "speed_count": "191"}
-"""Deck of the search in the peaks on the flexible support."""
 FINE = {**COARSE, "speed_first": "300.0", "speed_count": "571", "max_periods": "4000"}
 """Deck of the figures that are reported."""
 
@@ -38,12 +37,6 @@ SHORTLIST = 8
 """First points that the linear system leaves for the program, for each number of teeth."""
 LIKELY = 3
 """Numbers of teeth that the linear system leaves for the program."""
-GAUSS_STEPS = 3
-"""Corrections of l_o and l_x."""
-NUDGE = 0.02
-"""Relative change of l_o and l_x from which their effect is measured."""
-AROUND = (0.85, 0.9, 0.95, 1.0, 1.05)
-"""Factors on the l_x of the linear system with which the program is tried first."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +49,7 @@ class Fit:
         features: Features of the reported runs with the fitted start.
         by_start: Misfit of the same parameters by start.
         runs: Runs of the program that it took.
+        supports: The flexible support with every k_M that was tried; empty if it was not fitted.
     """
 
     hypothesis: Hypothesis
@@ -63,6 +57,7 @@ class Fit:
     features: list[Feature]
     by_start: dict[str, float]
     runs: int
+    supports: list[SupportFit] = field(default_factory=list)
 
     @property
     def misfit(self) -> float:
@@ -74,8 +69,8 @@ def fit(hypothesis: Hypothesis, program: Program, mean: MeanSystem) -> Fit:
     """Fit one hypothesis.
 
     First the coordinates that the rigid support knows, by a search with the program from the
-    points that the linear system likes best; then l_o and l_x by Gauss-Newton steps on the peaks
-    of the flexible support.
+    points that the linear system likes best; then l_o and l_x, with each k_M that the hypothesis
+    allows, by Gauss-Newton steps on the peaks of the flexible support.
 
     Args:
         hypothesis: What to fit.
@@ -102,10 +97,15 @@ def fit(hypothesis: Hypothesis, program: Program, mean: MeanSystem) -> Fit:
             best = found.value, hypothesis.make(found.point, teeth)
     assert best is not None
     unknowns = best[1]
+    supports: list[SupportFit] = []
     if hypothesis.support_free:
-        unknowns = fit_support(unknowns, hypothesis, program, mean)
+        factors = hypothesis.stiffness_factors or (unknowns.stiffness_factor,)
+        supports = fit_stiffness(
+            unknowns, factors, program, mean, offset_free=hypothesis.offset_free
+        )
+        unknowns = nearest_agreeing(supports, unknowns.stiffness_factor).unknowns
     features, by_start = reported(program, unknowns)
-    return Fit(hypothesis, unknowns, features, by_start, program.runs - before)
+    return Fit(hypothesis, unknowns, features, by_start, program.runs - before, supports)
 
 
 def rigid_misfits(program: Program, several: Sequence[Unknowns]) -> list[float]:
@@ -115,15 +115,6 @@ def rigid_misfits(program: Program, several: Sequence[Unknowns]) -> list[float]:
         for one in several
     ]
     return [misfit(curve_misfit(result, "rigid")) for result in program.run_all(decks)]
-
-
-def flexible_peaks(program: Program, several: Sequence[Unknowns]) -> list[list[Feature]]:
-    """Run the flexible support up to the peaks for several choices of the parameters."""
-    decks = [
-        {**LOW, **one.deck_values(), "support": "'flexible'", "start": "'static'"}
-        for one in several
-    ]
-    return [curve_misfit(result, "flexible", peaks_only=True) for result in program.run_all(decks)]
 
 
 def reported(
@@ -144,54 +135,6 @@ def reported(
     ]
     by_start = dict(zip(starts, map(misfit, several), strict=True))
     return several[0], by_start
-
-
-def fit_support(
-    unknowns: Unknowns, hypothesis: Hypothesis, program: Program, mean: MeanSystem
-) -> Unknowns:
-    """Fit l_o, where it is free, and l_x to the peaks on the flexible support."""
-    names = ["support_offset"] + ["gear_offset"] * hypothesis.offset_free
-    guess = _linear_support(unknowns, names, mean)
-    tries = [_scaled(guess, "support_offset", factor) for factor in AROUND]
-    found = flexible_peaks(program, tries)
-    best = int(np.argmin([misfit(run) for run in found]))
-    current, base = tries[best], found[best]
-    for _ in range(GAUSS_STEPS):
-        nudged = [_scaled(current, name, 1 + NUDGE) for name in names]
-        there = flexible_peaks(program, nudged)
-        if any(feature.computed is None for run in (base, *there) for feature in run):
-            break
-        rest = np.array([feature.deviation for feature in base], dtype=float)
-        slopes = np.array([[feature.deviation for feature in run] for run in there], dtype=float)
-        jacobian = (slopes - rest).T / np.log1p(NUDGE)
-        change = np.clip(-np.linalg.lstsq(jacobian, rest, rcond=None)[0], -0.2, 0.2)
-        trial = current
-        for name, step in zip(names, change, strict=True):
-            trial = _scaled(trial, name, float(np.exp(step)))
-        after = flexible_peaks(program, [trial])[0]
-        if misfit(after) >= misfit(base):
-            break
-        current, base = trial, after
-    return current
-
-
-def _linear_support(unknowns: Unknowns, names: Sequence[str], mean: MeanSystem) -> Unknowns:
-    """Choose l_x, and l_o where it is free, by the eigenfrequencies, on a grid."""
-    told = published_curve("flexible").peaks
-    offsets = np.geomspace(0.03, 5.0, 90)
-    gears = np.linspace(0.03, 0.16, 40) if "gear_offset" in names else [unknowns.gear_offset]
-    choices = [
-        replace(unknowns, support_offset=float(x), gear_offset=float(o))
-        for x in offsets
-        for o in gears
-    ]
-    off = [np.sum(mean.deviations(choice, (), told) ** 2) for choice in choices]
-    return choices[int(np.argmin(off))]
-
-
-def _scaled(unknowns: Unknowns, name: str, factor: float) -> Unknowns:
-    """Multiply one parameter."""
-    return unknowns.with_values(**{name: getattr(unknowns, name) * factor})
 
 
 def _likely_teeth(hypothesis: Hypothesis, mean: MeanSystem) -> list[int]:

@@ -16,6 +16,10 @@ ISO_MODULES = (2e-3, 2.5e-3, 3e-3)
 STEPS = 16
 """A coarse step: the article used Newmark's method with a step that it does not print."""
 INERTIA = "inertia"
+TENTH = "tenth"
+
+STIFFNESS_FACTORS = (100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0, 900.0, 1e3, 1.2e3)
+"""Factors on the printed k_M that are tried where it is free; 1000 reads it as N/mm."""
 
 TEN = 10.0
 """Step of the phase that is worth a step of the other coordinates [deg]."""
@@ -35,6 +39,7 @@ class Hypothesis:
         teeth: Teeth of gear 1 that are tried.
         offset_free: Whether l_o is free as well; else it follows from the gears.
         support_free: Whether l_x is free as well.
+        stiffness_factors: Factors on k_M that are tried; empty if `make` says which one.
     """
 
     key: str
@@ -46,6 +51,7 @@ class Hypothesis:
     teeth: tuple[int, ...]
     offset_free: bool = True
     support_free: bool = True
+    stiffness_factors: tuple[float, ...] = ()
 
 
 def _table_1(_: Reals, teeth: int) -> Unknowns:
@@ -129,7 +135,7 @@ def hypotheses() -> list[Hypothesis]:
             (24, 30, 40, 55),
         ),
         Hypothesis(
-            "tenth",
+            TENTH,
             "J a tenth of what is printed, k_M in N/mm; r1, z1, l_o, l_x free, the torques balance",
             ("r1",),
             tuple((float(log(radius)),) for radius in (0.046, 0.05, 0.054)),
@@ -138,8 +144,19 @@ def hypotheses() -> list[Hypothesis]:
             near,
         ),
         Hypothesis(
+            "support",
+            f"as '{TENTH}', and k_M by any factor: that nearest to N/mm with which most of the"
+            " peaks on the flexible support agree",
+            ("r1",),
+            tuple((float(log(radius)),) for radius in (0.046, 0.05, 0.054)),
+            (0.02,),
+            _radius(0.1, 1e3),
+            near,
+            stiffness_factors=STIFFNESS_FACTORS,
+        ),
+        Hypothesis(
             "unbalanced",
-            "as before, but r2 free: the torques need not balance",
+            f"as '{TENTH}', but r2 free: the torques need not balance",
             ("r1", "r2"),
             tuple((float(log(a)), float(log(b))) for a, b in ((0.052, 0.07), (0.06, 0.055))),
             (0.04, 0.04),

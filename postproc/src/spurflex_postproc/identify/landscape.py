@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spurflex_postproc.identify.fit import flexible_peaks, rigid_misfits
+from spurflex_postproc.identify.fit import rigid_misfits
 from spurflex_postproc.identify.misfit import misfit
 from spurflex_postproc.identify.program import Program
-from spurflex_postproc.identify.unknowns import TORQUES, Unknowns, balanced
+from spurflex_postproc.identify.support import flexible_peaks
+from spurflex_postproc.identify.unknowns import PRINTED_STIFFNESS, TORQUES, Unknowns, balanced
 
 Reals = NDArray[np.float64]
 
@@ -24,6 +25,10 @@ OFFSETS = np.linspace(0.06, 0.105, 10)
 """Distances l_o [m]."""
 SUPPORTS = np.linspace(0.104, 0.120, 9)
 """Distances l_x [m]."""
+STIFFNESSES = np.array([0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.25, 2.5, 2.75, 3.0]) * 1e8
+"""Support stiffnesses k_M [N/m]."""
+TURNING = np.linspace(2.7e6, 3.5e6, 9)
+"""Stiffnesses of the support against turning, k_M l_x^2 [N m]."""
 
 
 @dataclass(frozen=True)
@@ -45,17 +50,19 @@ class Map:
 
 @dataclass(frozen=True)
 class Landscape:
-    """Three maps of the misfit.
+    """Four maps of the misfit.
 
     Attributes:
         mass: Over mesh force [N] and mesh mass [kg], rigid features.
         phase: Over mesh force [N] and phase [deg], rigid features.
         support: Over l_o and l_x [m], peaks on the flexible support.
+        stiffness: Over k_M [N/m] and k_M l_x^2 [N m], the same peaks.
     """
 
     mass: Map
     phase: Map
     support: Map
+    stiffness: Map
 
 
 def landscape(program: Program, unknowns: Unknowns) -> Landscape:
@@ -81,6 +88,8 @@ def landscape(program: Program, unknowns: Unknowns) -> Landscape:
         [replace(unknowns, gear_offset=float(o), support_offset=float(x)) for o in OFFSETS]
         for x in SUPPORTS
     ]
+    stiffnesses = [[_turning(unknowns, k, turn) for k in STIFFNESSES] for turn in TURNING]
+    stiffness = unknowns.support_stiffness
     return Landscape(
         mass=Map(FORCES, MASSES, _rigid(program, masses), (force, mass)),
         phase=Map(
@@ -95,6 +104,12 @@ def landscape(program: Program, unknowns: Unknowns) -> Landscape:
             _flexible(program, supports),
             (unknowns.gear_offset, unknowns.support_offset),
         ),
+        stiffness=Map(
+            STIFFNESSES,
+            TURNING,
+            _flexible(program, stiffnesses),
+            (stiffness, unknowns.turning_stiffness),
+        ),
     )
 
 
@@ -103,6 +118,15 @@ def _gears(unknowns: Unknowns, force: float, mass: float) -> Unknowns:
     radius = TORQUES[0] / float(force)
     trial = replace(unknowns, radius_1=radius, radius_2=balanced(radius), inertia_factor=1.0)
     return replace(trial, inertia_factor=float(mass) / trial.mesh_mass)
+
+
+def _turning(unknowns: Unknowns, stiffness: float, turning: float) -> Unknowns:
+    """Choose the factor on k_M and l_x that give a stiffness and one against turning."""
+    return replace(
+        unknowns,
+        stiffness_factor=float(stiffness) / PRINTED_STIFFNESS,
+        support_offset=float(np.sqrt(turning / stiffness)),
+    )
 
 
 def _rigid(program: Program, grid: list[list[Unknowns]]) -> Reals:

@@ -52,7 +52,12 @@ def markdown(fits: Sequence[Fit], best: Fit, found: Determined, seconds: float) 
         Markdown text.
     """
     parts = [PREAMBLE, "## Hypotheses\n", _hypotheses(fits), "## Misfit per feature\n"]
-    parts += [_features(fits), "## What is determined\n", _determined(best, found)]
+    parts += [
+        _features(fits),
+        *_stiffnesses(fits),
+        "## What is determined\n",
+        _determined(best, found),
+    ]
     runs = sum(fit.runs for fit in fits)
     parts.append(f"{runs} runs of the program for the fits; {seconds:.0f} s in all.\n")
     return "\n".join(parts)
@@ -75,6 +80,15 @@ def as_json(fits: Sequence[Fit], best: Fit, found: Determined, seconds: float) -
                 "features": [
                     {**asdict(feature), "deviation": feature.deviation, "agrees": feature.agrees}
                     for feature in fit.features
+                ],
+                "stiffnesses": [
+                    {
+                        "stiffness_factor": one.unknowns.stiffness_factor,
+                        "gear_offset": one.unknowns.gear_offset,
+                        "support_offset": one.unknowns.support_offset,
+                        "deviations": [feature.deviation for feature in one.features],
+                    }
+                    for one in fit.supports
                 ],
                 "runs": fit.runs,
             }
@@ -117,7 +131,7 @@ def _hypotheses(fits: Sequence[Fit]) -> str:
                 f"{1e3 * one.radius_1:.1f}",
                 f"{1e3 * one.radius_2:.1f}",
                 f"{inertia} ({one.inertia_factor:.3g})",
-                f"{2.5e5 * one.stiffness_factor:.1e}",
+                f"{one.support_stiffness:.2e}",
                 f"{1e3 * one.gear_offset:.1f}",
                 f"{1e3 * one.support_offset:.1f}",
                 f"{one.error_phase:.0f}",
@@ -159,6 +173,42 @@ def _features(fits: Sequence[Fit]) -> str:
     keys = [fit.hypothesis.key for fit in fits]
     note = "Bold: agrees. *: only one of the two regimes of the border was found.\n"
     return "\n".join([table(["feature", "published", *keys], rows), note])
+
+
+def _stiffnesses(fits: Sequence[Fit]) -> list[str]:
+    """Show what the peaks on the flexible support say about k_M; nothing where it was not free."""
+    parts = []
+    for fit in fits:
+        if len(fit.supports) < 2:
+            continue
+        peaks = [f"peak {feature.published:.0f}" for feature in fit.supports[0].features]
+        head = ["factor", "k_M N/m", "l_o mm", "l_x mm", "k_M l_x^2 N m", *peaks, "agree"]
+        rows = []
+        for support in fit.supports:
+            one = support.unknowns
+            taken = " (taken)" if one == fit.unknowns else ""
+            off = [
+                "none" if feature.deviation is None else f"{100 * feature.deviation:+z.2f} %"
+                for feature in support.features
+            ]
+            rows.append(
+                [
+                    f"{one.stiffness_factor:g}{taken}",
+                    f"{one.support_stiffness:.2e}",
+                    f"{1e3 * one.gear_offset:.1f}",
+                    f"{1e3 * one.support_offset:.1f}",
+                    f"{one.turning_stiffness:.2e}",
+                    *off,
+                    f"{support.agreeing} of {len(support.features)}",
+                ]
+            )
+        parts += [
+            f"## Support stiffness with '{fit.hypothesis.key}'\n",
+            "The peaks on the flexible support with l_o and l_x fitted anew for each k_M. They know"
+            " k_M l_x^2 well and k_M itself hardly: it moves the highest peak only.\n",
+            table(head, rows),
+        ]
+    return parts
 
 
 def _determined(best: Fit, found: Determined) -> str:

@@ -49,6 +49,16 @@ class Unknowns:
         )
 
     @property
+    def support_stiffness(self) -> float:
+        """Support stiffness k_M [N/m]."""
+        return self.stiffness_factor * PRINTED_STIFFNESS
+
+    @property
+    def turning_stiffness(self) -> float:
+        """Stiffness of the support against turning, k_M l_x^2 [N m]."""
+        return self.support_stiffness * self.support_offset**2
+
+    @property
     def mesh_mass(self) -> float:
         """Equivalent mass along the line of action, 1 / (r1^2/J1 + r2^2/J2) [kg]."""
         one, two = self.inertias
@@ -69,7 +79,7 @@ class Unknowns:
     def deck_values(self) -> dict[str, str]:
         """Return keys of a deck and their values as text."""
         one, two = self.inertias
-        stiffness = self.stiffness_factor * PRINTED_STIFFNESS
+        stiffness = self.support_stiffness
         coarse = {"integrator": "'newmark'", "steps_per_period": str(self.steps)}
         return {
             **(coarse if self.steps else {}),

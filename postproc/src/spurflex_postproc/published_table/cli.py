@@ -20,6 +20,7 @@ from spurflex_postproc.published_table.regimes import point_rows, regime_rows
 from spurflex_postproc.published_table.row import Row
 from spurflex_postproc.published_table.sources import REFERENCE, Sources, load
 from spurflex_postproc.published_table.write import as_json, counts, markdown, summary
+from spurflex_postproc.recordings import SPECTRUM, has_recording
 
 COMPLETE, FAILED, UNUSABLE = 0, 1, 2
 
@@ -79,7 +80,12 @@ def build(sources: Sources) -> tuple[list[Row], list[Row], list[Setting]]:
         return [*curve_rows(result), *regime_rows(result)]
 
     rows = from_curves(sources.reference)
-    rows += point_rows([*sources.points, sources.reference])
+    sweeps = [
+        trial.result
+        for trial in sources.trials
+        if trial.kind == "start" and has_recording(trial.result, SPECTRUM, "y1", "flexible")
+    ]
+    rows += point_rows([*sources.points, sources.reference], sweeps=sweeps)
     settings: list[Setting] = [(f"start = '{REFERENCE}'", "reference", rows)]
     tried = [
         (trial, [*from_curves(trial.result), *point_rows([trial.result], complete=False)])

@@ -6,7 +6,7 @@ import xarray as xr
 from spurflex_postproc.features import transition
 from spurflex_postproc.published import published_map
 from spurflex_postproc.published_table.bearing import general
-from spurflex_postproc.published_table.maps import StiffnessMap, stiffness_map
+from spurflex_postproc.published_table.maps import StiffnessMap, follow_crest, stiffness_map
 from spurflex_postproc.published_table.row import Row, statement
 
 BEARING_STIFFNESS = 2.0e8
@@ -78,6 +78,14 @@ def _bearings(map_: StiffnessMap) -> list[Row]:
     stiff = map_.stiffness > BEARING_STIFFNESS
     rigid_share = float(np.mean(found.difference[stiff] < SMALL))
     ratio = found.rigid_from / BEARING_STIFFNESS
+    told = published_map()
+    reaches = follow_crest(map_, told).stiffness_at(told.flat[0])
+    line = (
+        f"; the crest line of figure 9, extended, reaches {told.flat[0]:.0f} rev/min at"
+        f" {reaches:.1e} N/m"
+        if np.isfinite(reaches)
+        else ""
+    )
     return [
         statement(
             "conclusion 2",
@@ -100,6 +108,7 @@ def _bearings(map_: StiffnessMap) -> list[Row]:
             f"at {100 * rigid_share:.0f} % of the stiffnesses above, from"
             f" {found.rigid_from:.1e} N/m",
             bool(ratio <= 1.5),
-            f"that is {ratio:.0f} times the stiffness of the bearings; a tendency, not a threshold",
+            f"that is {ratio:.0f} times the stiffness of the bearings; a tendency, not a"
+            f" threshold{line}",
         ),
     ]

@@ -9,13 +9,11 @@ from numpy.typing import NDArray
 from spurflex_postproc.features import CrestLine, compare, crest_line, find_peaks
 from spurflex_postproc.flags import is_regular
 from spurflex_postproc.layout import SPEED, STIFFNESS
-from spurflex_postproc.published import PublishedMap, published_map, tolerance
+from spurflex_postproc.published import PAPER_STIFFNESS, PublishedMap, published_map, tolerance
 from spurflex_postproc.published_table.row import Row, number, statement
 
 Reals = NDArray[np.float64]
 
-PAPER_STIFFNESS = 2.5e8
-"""Support stiffness of the flexible curve in figure 2 [N/m]."""
 WITHIN = 0.06
 """Largest distance of a crest from its published partner, as a fraction."""
 LITTLE = 0.05
@@ -117,8 +115,8 @@ def map_rows(result: xr.Dataset) -> list[Row]:
 def _crests(map_: StiffnessMap, line: CrestLine, told: PublishedMap) -> list[Row]:
     """Compare the crests at the published stiffness and with a stiff support."""
     row = map_.row(PAPER_STIFFNESS)
-    start = float(line.speed[row])
-    at = f"{map_.stiffness[row]:.2g} N/m"
+    start = line.between(PAPER_STIFFNESS)
+    at = f"{map_.stiffness[row]:.3g} N/m"
     rows = [
         number(
             "figure 9 crest",
@@ -127,7 +125,7 @@ def _crests(map_: StiffnessMap, line: CrestLine, told: PublishedMap) -> list[Row
             told.crest,
             start if np.isfinite(start) else None,
             tolerance("peak"),
-            note=f"at {at}",
+            note=f"at {PAPER_STIFFNESS:.3g} N/m, between the rows of the map",
         )
     ]
     for side, speeds, here, where in (

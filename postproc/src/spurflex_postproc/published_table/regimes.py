@@ -116,13 +116,17 @@ def _chaotic(result: xr.Dataset, found: CurveFeatures, support: str) -> Row:
     )
 
 
-def point_rows(results: Sequence[xr.Dataset], *, complete: bool = True) -> list[Row]:
+def point_rows(
+    results: Sequence[xr.Dataset], *, complete: bool = True, sweeps: Sequence[xr.Dataset] = ()
+) -> list[Row]:
     """Compare the motion and the spectrum at the five speeds of figures 4 to 8.
 
     Args:
         results: Datasets from `open_result` with the flexible support. Each motion and each
             spectrum is taken from the first that holds it.
         complete: Whether rows that cannot be told are listed as open; if not, they are left out.
+        sweeps: Datasets with spectra over many speeds. Where another order than the published one
+            is the strongest, a note says at which speeds the published one is.
 
     Returns:
         For each speed the motion, the strongest order and the other orders.
@@ -154,11 +158,17 @@ def point_rows(results: Sequence[xr.Dataset], *, complete: bool = True) -> list[
             )
         elif complete:
             rows.append(_open(f"{key} motion", point, f"{where}: motion", point.motion))
-        rows += _orders(point, results, complete=complete)
+        rows += _orders(point, results, sweeps, complete=complete)
     return rows
 
 
-def _orders(point: PublishedPoint, results: Sequence[xr.Dataset], *, complete: bool) -> list[Row]:
+def _orders(
+    point: PublishedPoint,
+    results: Sequence[xr.Dataset],
+    sweeps: Sequence[xr.Dataset],
+    *,
+    complete: bool,
+) -> list[Row]:
     """Compare the lines of the spectrum."""
     key, where = f"figure {point.figure}", f"flexible support, {point.speed:.0f} rev/min"
     dominant, others = f"{where}: strongest order", f"{where}: other orders"
@@ -190,7 +200,14 @@ def _orders(point: PublishedPoint, results: Sequence[xr.Dataset], *, complete: b
             point.dominant,
             lines[0].order,
             close,
-            note=_strength(point.dominant, lines, close),
+            note="; ".join(
+                part
+                for part in (
+                    _strength(point.dominant, lines, close),
+                    _where_strongest(point, lines[0].order, sweeps, close),
+                )
+                if part
+            ),
         ),
         statement(
             f"{key} orders",
@@ -210,6 +227,29 @@ def _strength(order: float, lines: Sequence[Line], close: float) -> str:
     for line in lines:
         if abs(line.order - order) <= close:
             return f"{order:.4g}: {100 * line.amplitude / lines[0].amplitude:.1f} %"
+    return ""
+
+
+def _where_strongest(
+    point: PublishedPoint, strongest: float, sweeps: Sequence[xr.Dataset], close: float
+) -> str:
+    """Say where in the published motion its strongest order is the strongest, if not here."""
+    if abs(strongest - point.dominant) <= close:
+        return ""
+    for result in sweeps:
+        speed = np.asarray(result[SPEED].values, dtype=float)
+        named = [flag_name(int(flag)) for flag in result["motion"].values[0]]
+        inside = np.array([name == point.motion for name in named])
+        spectra = read_spectra(result, "y1", "flexible", 0)
+        heights = np.where(spectra.order > 0, np.nan_to_num(spectra.amplitude), 0.0)
+        tops = spectra.order[np.argmax(heights, axis=1)]
+        there = speed[inside & (np.abs(tops - point.dominant) <= close)]
+        if there.size:
+            here = speed[inside]
+            return (
+                f"strongest from {there[0]:.0f} to {there[-1]:.0f} of the {point.motion} motions"
+                f" from {here[0]:.0f} to {here[-1]:.0f}"
+            )
     return ""
 
 
