@@ -7,6 +7,7 @@ import pytest
 from result_files import write_motions, write_result
 
 from spurflex_postproc import style
+from spurflex_postproc.published import PAPER_STIFFNESS
 
 SPEED = np.linspace(300.0, 6000.0, 571)
 STIFFNESS = np.logspace(3, 12, 10)
@@ -22,7 +23,7 @@ def _style() -> None:
 def curve_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Both supports, one stiffness, with an irregular band."""
     path = tmp_path_factory.mktemp("curve") / "figure2.h5"
-    return write_result(path, SPEED, np.array([2.5e8]), irregular=BAND)
+    return write_result(path, SPEED, np.array([PAPER_STIFFNESS]), irregular=BAND)
 
 
 @pytest.fixture(scope="session")

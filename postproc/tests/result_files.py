@@ -6,6 +6,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from spurflex_postproc.published import PAPER_STIFFNESS
+
 Reals = NDArray[np.float64]
 
 UNITS = {"speed": "rpm", "support_stiffness": "N/m", "eta1": "percent", "error_estimate": "1"}
@@ -25,9 +27,9 @@ def rigid_amplitude(speed: Reals) -> Reals:
 
 
 def flexible_amplitude(speed: Reals, stiffness: Reals) -> Reals:
-    """The same with a crest that passes 480 rev/min at 2.5e8 N/m; shape (m, n) [m]."""
+    """The same with a crest that passes 480 rev/min at `PAPER_STIFFNESS`; shape (m, n) [m]."""
     n, k = np.meshgrid(speed, stiffness)
-    centre = 480 * np.sqrt(k / 2.5e8)
+    centre = 480 * np.sqrt(k / PAPER_STIFFNESS)
     soft = 1 / (1 + (k / 2e9) ** 1.5)
     first, second = 1180 + 110 * soft, 1730 + 170 * soft
     smooth = 1.2 + crest(n, first, 55, 6) + crest(n, second, 80, 9)

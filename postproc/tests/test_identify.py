@@ -10,11 +10,13 @@ from result_files import write_result
 
 from spurflex_postproc import open_result
 from spurflex_postproc.identify import cli, determined, landscape
+from spurflex_postproc.identify import hypotheses as hypotheses_of
 from spurflex_postproc.identify.hypotheses import hypotheses
 from spurflex_postproc.identify.linear import MeanSystem
 from spurflex_postproc.identify.misfit import Feature, curve_misfit, misfit
 from spurflex_postproc.identify.program import Program, ProgramError, rewritten
 from spurflex_postproc.identify.search import compass
+from spurflex_postproc.identify.support import SupportFit, nearest_agreeing
 from spurflex_postproc.identify.unknowns import Unknowns, balanced, standard_gears
 
 DECK = """\
@@ -156,6 +158,23 @@ def test_misfit_of_a_curve(curve_file: Path) -> None:
     assert len(curve_misfit(result, "flexible", peaks_only=True)) == 3
 
 
+def test_stiffness_that_departs_least_is_taken() -> None:
+    def support(factor: float, *deviations: float) -> SupportFit:
+        features = [Feature("", 1.0, 1.0 + one, 0.01) for one in deviations]
+        return SupportFit(TENTH.with_values(stiffness_factor=factor), features)
+
+    fits = [support(500, 0, 0, 0), support(700, 0.009, 0, 0), support(900, 0.012, 0, 0)]
+    assert nearest_agreeing(fits, 1e3) is fits[1]
+    assert nearest_agreeing(fits, 100) is fits[0]
+    assert nearest_agreeing(fits[2:], 1e3) is fits[2]
+    assert [one.agreeing for one in fits] == [3, 3, 2]
+
+
+def test_turning_stiffness() -> None:
+    assert TENTH.support_stiffness == pytest.approx(2.5e8)
+    assert TENTH.turning_stiffness == pytest.approx(2.5e8 * 0.11**2)
+
+
 def test_every_hypothesis_makes_parameters() -> None:
     several = hypotheses()
     assert len({one.key for one in several}) == len(several)
@@ -194,19 +213,29 @@ def test_command(
 ) -> None:
     monkeypatch.setattr(cli, "Program", FakeProgram)
     monkeypatch.setattr(determined, "PARAMETERS", ("radius_1",))
-    for name in ("FORCES", "MASSES", "PHASES", "PHASE_FORCES", "OFFSETS", "SUPPORTS"):
+    monkeypatch.setattr(hypotheses_of, "STIFFNESS_FACTORS", (1e3, 500.0))
+    grids = ("FORCES", "MASSES", "PHASES", "PHASE_FORCES", "OFFSETS", "SUPPORTS")
+    for name in (*grids, "STIFFNESSES", "TURNING"):
         monkeypatch.setattr(landscape, name, getattr(landscape, name)[:2])
     deck = tmp_path / "deck.nml"
     deck.write_text(DECK)
     out = tmp_path / "out"
     arguments = ["--program", "none", "--deck", str(deck), "--output", str(out)]
-    assert cli.main([*arguments, "--only", "table 1", "--only", "tenth"]) == 0
+    chosen = ("table 1", "tenth", "support")
+    assert cli.main([*arguments, *(f"--only={name}" for name in chosen)]) == 0
     content = json.loads((out / "identification.json").read_text())
-    assert [fit["hypothesis"] for fit in content["fits"]] == ["table 1", "tenth"]
+    assert [fit["hypothesis"] for fit in content["fits"]] == list(chosen)
     assert content["fits"][0]["parameters"]["inertia_factor"] == 1.0
     text = (out / "identification.md").read_text()
     assert "not the authors' own" in text
     assert "| rigid peak | 1180 |" in text
+    # The made-up peaks are the same with every k_M: that which departs least is taken.
+    tried = [one["stiffness_factor"] for one in content["fits"][2]["stiffnesses"]]
+    assert tried == [1e3, 500.0]
+    assert content["fits"][2]["parameters"]["stiffness_factor"] == 1e3
+    assert "## Support stiffness with 'support'" in text
+    assert "| 1000 (taken) | 2.50e+08 |" in text
+    assert "with 'tenth'" not in text
     assert (out / "landscape.pdf").read_bytes().startswith(b"%PDF")
     assert "wrote" in capsys.readouterr().out
 

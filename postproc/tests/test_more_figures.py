@@ -11,6 +11,7 @@ from result_files import write_result
 from spurflex_postproc import ResultError, open_result
 from spurflex_postproc.cli import main
 from spurflex_postproc.figures import FIGURES, Options
+from spurflex_postproc.published import PAPER_STIFFNESS
 
 SPEED = np.linspace(300.0, 6000.0, 571)
 
@@ -32,7 +33,7 @@ def start_files(tmp_path: Path) -> list[Path]:
     paths = []
     for start, band in (("up", None), ("rest", (4900.0, 5000.0))):
         path = write_result(
-            tmp_path / f"figure2-{start}.h5", SPEED, np.array([2.5e8]), irregular=band
+            tmp_path / f"figure2-{start}.h5", SPEED, np.array([PAPER_STIFFNESS]), irregular=band
         )
         with h5py.File(path, "r+") as file:
             file["provenance"]["resolved_deck"] = f"&sweep\n  start = '{start}'\n/\n"

@@ -10,9 +10,15 @@ from result_files import (
     veering_crests,
 )
 
-from spurflex_postproc.features import compare, comparison_table, crest_line, find_peaks
+from spurflex_postproc.features import (
+    CrestLine,
+    compare,
+    comparison_table,
+    crest_line,
+    find_peaks,
+)
 from spurflex_postproc.figures.stiffness_table import map_table
-from spurflex_postproc.published import published_curve, published_map
+from spurflex_postproc.published import PAPER_STIFFNESS, published_curve, published_map
 
 SPEED = np.arange(300.0, 6001.0, 10.0)
 
@@ -62,16 +68,32 @@ def test_crest_line_follows_the_square_root_of_the_stiffness() -> None:
         SPEED,
         amplitude,
         np.ones(amplitude.shape, dtype=bool),
-        start=(2.5e8, 480),
+        start=(PAPER_STIFFNESS, 480),
         highest=3100,
     )
     known = np.isfinite(line.speed)
     assert known.sum() > 12
-    expected = 480 * np.sqrt(stiffness[known] / 2.5e8)
+    expected = 480 * np.sqrt(stiffness[known] / PAPER_STIFFNESS)
     assert line.speed[known] == pytest.approx(expected, rel=0.05)
-    assert line.speed_at(1e9) == pytest.approx(960, rel=0.03)
+    there = 480 * np.sqrt(1e9 / PAPER_STIFFNESS)
+    assert line.speed_at(1e9) == pytest.approx(there, rel=0.03)
+    assert line.stiffness_at(float(line.speed_at(1e9))) == pytest.approx(1e9)
     heights = line.height[known]
     assert heights[-1] < heights[0]
+
+
+def test_crest_between_rows() -> None:
+    stiffness = np.array([1e8, 2e8, 4e8, 8e8])
+    speed = np.array([300.0, 300.0 * np.sqrt(2), 600.0, np.nan])
+    line = CrestLine(stiffness, speed, np.ones(4))
+    # A power law is met exactly, on the rows and between them.
+    for wanted in (1e8, 1.75e8, 2e8, 3e8, 4e8):
+        assert line.between(wanted) == pytest.approx(300 * np.sqrt(wanted / 1e8))
+    assert line.stiffness_at(450) == pytest.approx(2.25e8)
+    # Beyond the line, and beside a row that lacks the crest.
+    for wanted in (5e7, 5e8, 1e9):
+        assert np.isnan(line.between(wanted))
+    assert np.isnan(CrestLine(stiffness, np.full(4, np.nan), np.ones(4)).stiffness_at(450))
 
 
 @pytest.mark.parametrize("count", [46, 61, 91])

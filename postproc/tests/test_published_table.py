@@ -11,6 +11,7 @@ from result_files import add_recordings, write_result
 from spurflex_postproc import open_result
 from spurflex_postproc.markdown import table
 from spurflex_postproc.published import (
+    PAPER_STIFFNESS,
     published_areas,
     published_points,
     published_regimes,
@@ -30,7 +31,7 @@ BAND = (4650.0, 4990.0)
 
 def curves(path: Path, start: str, **deck: object) -> Path:
     """Write a result of figure 2 with a resolved deck."""
-    write_result(path, SPEED, np.array([2.5e8]), irregular=BAND)
+    write_result(path, SPEED, np.array([PAPER_STIFFNESS]), irregular=BAND)
     lines = [f"  start = '{start}'", *(f"  {key} = {value}" for key, value in deck.items())]
     with h5py.File(path, "r+") as file:
         file["provenance"]["resolved_deck"] = "&sweep\n" + "\n".join(lines) + "\n/\n"
@@ -84,7 +85,7 @@ def test_rows_of_points(folder: Path) -> None:
 
 def point(path: Path, start: str, speed: float, flag: int) -> Path:
     """Write a result of one of the figures 4 to 8 with a spectrum."""
-    write_result(path, np.array([speed]), np.array([2.5e8]), support="flexible")
+    write_result(path, np.array([speed]), np.array([PAPER_STIFFNESS]), support="flexible")
     with h5py.File(path, "r+") as file:
         file["motion"][...] = flag
         file["provenance"]["resolved_deck"] = f"&sweep\n  start = '{start}'\n/\n"
@@ -106,6 +107,29 @@ def test_rows_of_spectra(folder: Path) -> None:
     assert orders.met == pytest.approx(5 / 6)
     assert orders.note.startswith("lacking 2.667; 0.3333: 50.0 %; 1: 100.0 %")
     assert rows["figure 7 orders"].agrees is None
+
+
+def test_note_says_where_the_published_order_is_the_strongest(folder: Path) -> None:
+    point(folder / "figure8.h5", "up", 5900.0, 2)
+    sweep = write_result(
+        folder / "sweep.h5", np.array([5500.0, 5600.0, 5700.0]), np.array([PAPER_STIFFNESS])
+    )
+    with h5py.File(sweep, "r+") as file:
+        file["motion"][...] = [[1, 2, 2]]
+    add_recordings(sweep)
+    for path, height in ((folder / "figure8.h5", 9.0), (sweep, 0.0)):
+        with h5py.File(path, "r+") as file:
+            half = int(np.argmin(np.abs(file["order"][:] - 0.5)))
+            file["spectrum"][..., half] = height
+            if path == sweep:
+                file["spectrum"][0, 2, half] = 9.0
+    results = load(folder).points
+    rows = {row.key: row for row in point_rows(results, sweeps=[open_result(sweep)])}
+    # Only at 5600 rev/min is the motion 2T and its strongest order 1.
+    assert rows["figure 8 dominant"].note.endswith(
+        "strongest from 5600 to 5600 of the 2T motions from 5600 to 5700"
+    )
+    assert "strongest" not in {r.key: r for r in point_rows(results)}["figure 8 dominant"].note
 
 
 def test_combinations_of_two_frequencies_are_told(folder: Path) -> None:
