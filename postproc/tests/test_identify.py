@@ -221,7 +221,7 @@ def test_command(
     deck.write_text(DECK)
     out = tmp_path / "out"
     arguments = ["--program", "none", "--deck", str(deck), "--output", str(out)]
-    chosen = ("table 1", "tenth", "support")
+    chosen = ("table 1", "tenth", "decks")
     assert cli.main([*arguments, *(f"--only={name}" for name in chosen)]) == 0
     content = json.loads((out / "identification.json").read_text())
     assert [fit["hypothesis"] for fit in content["fits"]] == list(chosen)
@@ -233,7 +233,7 @@ def test_command(
     tried = [one["stiffness_factor"] for one in content["fits"][2]["stiffnesses"]]
     assert tried == [1e3, 500.0]
     assert content["fits"][2]["parameters"]["stiffness_factor"] == 1e3
-    assert "## Support stiffness with 'support'" in text
+    assert "## Support stiffness with 'decks'" in text
     assert "| 1000 (taken) | 2.50e+08 |" in text
     assert "with 'tenth'" not in text
     assert (out / "landscape.pdf").read_bytes().startswith(b"%PDF")

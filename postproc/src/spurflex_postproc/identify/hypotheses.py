@@ -17,6 +17,8 @@ STEPS = 16
 """A coarse step: the article used Newmark's method with a step that it does not print."""
 INERTIA = "inertia"
 TENTH = "tenth"
+DECKS = "decks"
+"""What the decks of the figures carry."""
 
 STIFFNESS_FACTORS = (100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0, 900.0, 1e3, 1.2e3)
 """Factors on the printed k_M that are tried where it is free; 1000 reads it as N/mm."""
@@ -88,6 +90,12 @@ def _unbalanced(point: Reals, teeth: int) -> Unknowns:
     return Unknowns(one, two, teeth, 0.08, 0.11, 0.1, 1e3)
 
 
+def _decks(_: Reals, teeth: int) -> Unknowns:
+    """Free: nothing but the support."""
+    gears = standard_gears(ISO_MODULES[0], teeth)
+    return Unknowns(gears["radius_1"], gears["radius_2"], teeth, 0.08, 0.11, 0.1, 1e3)
+
+
 def _standard(module: float) -> Callable[[Reals, int], Unknowns]:
     """Free: logarithm of the factor on J, and the phase."""
 
@@ -144,14 +152,15 @@ def hypotheses() -> list[Hypothesis]:
             near,
         ),
         Hypothesis(
-            "support",
-            f"as '{TENTH}', and k_M by any factor: that nearest to N/mm with which most of the"
-            " peaks on the flexible support agree",
-            ("r1",),
-            tuple((float(log(radius)),) for radius in (0.046, 0.05, 0.054)),
-            (0.02,),
-            _radius(0.1, 1e3),
-            near,
+            DECKS,
+            "base radii of standard gears of module 2 mm with 55 and 75 teeth, J a tenth of what"
+            " is printed; l_o and l_x free, and k_M by any factor: that nearest to N/mm with which"
+            " most of the peaks on the flexible support agree",
+            (),
+            ((),),
+            (),
+            _decks,
+            (55,),
             stiffness_factors=STIFFNESS_FACTORS,
         ),
         Hypothesis(

@@ -49,6 +49,15 @@ class Feature:
         return abs(self.deviation) <= self.allowed
 
     @property
+    def regular(self) -> bool:
+        """Whether it is a peak, the first jump, or the border from 1T to 2T motion.
+
+        The other borders are those of irregular and of 3T motion, which depend on the start and
+        on the step as much as on the parameters.
+        """
+        return "chaotic" not in self.name and "3T" not in self.name
+
+    @property
     def penalty(self) -> float:
         """The size of the deviation in units of the allowed one.
 

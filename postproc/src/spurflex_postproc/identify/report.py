@@ -8,6 +8,7 @@ import numpy as np
 
 from spurflex_postproc.identify.determined import LOOSE, Determined
 from spurflex_postproc.identify.fit import Fit
+from spurflex_postproc.identify.hypotheses import DECKS
 from spurflex_postproc.identify.misfit import Feature, misfit
 from spurflex_postproc.markdown import table
 
@@ -118,7 +119,7 @@ def _hypotheses(fits: Sequence[Fit]) -> str:
     head = [
         *("hypothesis", "z1", "r1 mm", "r2 mm", "J1, J2 kg m2 (factor)", "k_M N/m"),
         *("l_o mm", "l_x mm", "phase deg", "m_t kg", "F N"),
-        *("misfit rigid", "misfit all", "agree"),
+        *("misfit rigid", "misfit all", "agree", "regular agree"),
     ]
     rows = []
     for fit in fits:
@@ -139,7 +140,8 @@ def _hypotheses(fits: Sequence[Fit]) -> str:
                 f"{one.mesh_force:.0f}",
                 f"{misfit(_rigid(fit)):.2f}",
                 f"{fit.misfit:.2f}",
-                f"{sum(feature.agrees for feature in fit.features)} of {len(fit.features)}",
+                _agreeing(fit.features),
+                _agreeing([feature for feature in fit.features if feature.regular]),
             ]
         )
     starts = list(fits[0].by_start)
@@ -151,10 +153,18 @@ def _hypotheses(fits: Sequence[Fit]) -> str:
             *lines,
             "",
             table(head, rows),
+            "Regular: the peaks, the first jump and the borders from 1T to 2T motion; the borders"
+            " of irregular and 3T motion depend on the start and on the step as well. The decks of"
+            f" the figures carry '{DECKS}', with the phase as it is printed.\n",
             "The start decides among coexisting motions; misfit of all features by start:\n",
             table(["hypothesis", *starts], by_start),
         ]
     )
+
+
+def _agreeing(features: Sequence[Feature]) -> str:
+    """Count the features that agree."""
+    return f"{sum(feature.agrees for feature in features)} of {len(features)}"
 
 
 def _features(fits: Sequence[Fit]) -> str:
@@ -199,7 +209,7 @@ def _stiffnesses(fits: Sequence[Fit]) -> list[str]:
                     f"{1e3 * one.support_offset:.1f}",
                     f"{one.turning_stiffness:.2e}",
                     *off,
-                    f"{support.agreeing} of {len(support.features)}",
+                    _agreeing(support.features),
                 ]
             )
         parts += [
