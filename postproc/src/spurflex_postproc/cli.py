@@ -7,9 +7,9 @@ from pathlib import Path
 
 from spurflex_postproc import __version__, style
 from spurflex_postproc.figures import FIGURES, Options
-from spurflex_postproc.figures.common import PAPER_STIFFNESS
 from spurflex_postproc.layout import ResultError
 from spurflex_postproc.output import save
+from spurflex_postproc.published import PAPER_STIFFNESS
 from spurflex_postproc.quantities import QUANTITIES
 from spurflex_postproc.reading import coverage, open_result, require
 

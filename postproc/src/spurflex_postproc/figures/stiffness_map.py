@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from spurflex_postproc import style
 from spurflex_postproc.features import CrestLine, crest_line
 from spurflex_postproc.figures.common import (
-    PAPER_STIFFNESS,
     SPEED_LABEL,
     STIFFNESS_LABEL,
     Drawing,
@@ -29,7 +28,7 @@ from spurflex_postproc.figures.stiffness_surface import draw_surface
 from spurflex_postproc.figures.stiffness_table import map_table
 from spurflex_postproc.flags import Status, is_regular
 from spurflex_postproc.layout import SPEED, STIFFNESS, ResultError
-from spurflex_postproc.published import PublishedMap, published_map
+from spurflex_postproc.published import PAPER_STIFFNESS, PublishedMap, published_map
 
 NEEDS = ("y1_amplitude", "status", "motion")
 

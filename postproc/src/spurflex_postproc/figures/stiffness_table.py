@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spurflex_postproc.features import CrestLine, Peak, compare, comparison_table, find_peaks
-from spurflex_postproc.figures.common import PAPER_STIFFNESS
-from spurflex_postproc.published import PublishedMap
+from spurflex_postproc.published import PAPER_STIFFNESS, PublishedMap
 
 Reals = NDArray[np.float64]
 Flags = NDArray[np.bool_]

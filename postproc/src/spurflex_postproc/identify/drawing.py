@@ -52,7 +52,8 @@ def draw(maps: Landscape, fits: Sequence[Fit], best: Fit) -> Figure:
         The figure.
     """
     figure = Figure(figsize=style.size(style.DOUBLE, 190), layout="constrained")
-    upper, lower = figure.subfigures(2, 1, height_ratios=[1.5, 1.15])
+    halves: Any = figure.subfigures(2, 1, height_ratios=[1.5, 1.15])
+    upper, lower = halves
     axes = list(upper.subplots(2, 2).flat)
     rigid = "mean mesh force $F$ (N)"
     turning = r"$k_\mathrm{M} l_\mathrm{x}^2$ (MN m)"
@@ -110,8 +111,8 @@ def _map(axes: Axes, values: Map, unit: tuple[float, float]) -> Any:
     labels = axes.clabel(lines, fontsize=5, fmt="%g")
     for label in labels or ():
         label.set_path_effects([OUTLINE])
-    axes.set_xlim(edges(x)[[0, -1]])
-    axes.set_ylim(edges(y)[[0, -1]])
+    axes.set_xlim(edges(x)[0], edges(x)[-1])
+    axes.set_ylim(edges(y)[0], edges(y)[-1])
     return mesh
 
 

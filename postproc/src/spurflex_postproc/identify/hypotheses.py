@@ -102,12 +102,14 @@ def _standard(module: float) -> Callable[[Reals, int], Unknowns]:
     def make(point: Reals, teeth: int) -> Unknowns:
         gears = standard_gears(module, teeth)
         return Unknowns(
-            teeth=teeth,
-            support_offset=0.11,
-            inertia_factor=float(np.exp(point[0])),
-            stiffness_factor=1e3,
-            error_phase=TEN * float(point[1]),
-            **gears,
+            gears["radius_1"],
+            gears["radius_2"],
+            teeth,
+            gears["gear_offset"],
+            0.11,
+            float(np.exp(point[0])),
+            1e3,
+            TEN * float(point[1]),
         )
 
     return make

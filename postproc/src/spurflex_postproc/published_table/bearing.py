@@ -176,4 +176,4 @@ def rank_correlation(one: Reals, other: Reals) -> float:
     """Return Spearman's rank correlation of two arrays of one shape, without NaN pairs."""
     known = np.isfinite(one) & np.isfinite(other)
     ranks = [np.argsort(np.argsort(values[known])) for values in (one, other)]
-    return float(np.corrcoef(ranks)[0, 1])
+    return float(np.asarray(np.corrcoef(ranks))[0, 1])
