@@ -26,8 +26,10 @@ module spurflex_steady_candidate
    !> nearer by a factor.
    real(wp), parameter :: near_recurrence = 0.1_wp, clearly_nearer = 0.3_wp, much_clearer = 0.1_wp
 
-   !> The same at which a motion of many mesh periods is looked for at all.
+   !> The same at which a motion of many mesh periods is looked for at all, and mesh periods before: it is dear, and what it is
+   !> not told from, a torus, takes longer to be told.
    real(wp), parameter :: long_recurrence = 0.005_wp
+   integer, parameter :: long_wait = 768
 
    !> Near a periodic motion Newton's method leads to it, also with a multiple of its period, unless the transient repeats itself
    !> more nearly than this share of its distance.
@@ -93,8 +95,10 @@ contains
       real(wp) :: distances(longest_period), before
       integer :: k, short
 
-      distances = [(transient%ring%distance(k), k=1, longest_period)]
       periods = 1
+      recurrence = huge(1.0_wp)
+      if (transient%periods == 0) return
+      distances = [(transient%ring%distance(k), k=1, longest_period)]
       short = 0
       do k = 1, longest_period
          if (distances(k) < clearly_nearer*distances(periods)) periods = k
@@ -105,12 +109,13 @@ contains
       if (short > 0 .and. (transient%periods <= always_tried .or. distances(periods) > much_clearer*distances(max(short, 1)))) &
          periods = short
       recurrence = distances(periods)
-      if (.not. is_new(periods) .or. (periods > longest_named .and. recurrence > long_recurrence*scale)) periods = 0
+      if (periods > longest_named .and. (recurrence > long_recurrence*scale .or. transient%periods < long_wait)) periods = 0
+      if (periods > 0) periods = merge(periods, 0, is_new(periods))
       if (.not. in_phase(self, transient) .or. transient%periods > trusted) return
       before = self%distance
       self%distance = weighted_norm(weight, transient%state - self%orbit%state)
       if (self%is_stable .and. self%distance <= merge(nearer, much_nearer, periods == self%orbit%periods)*before) periods = 0
-      if (mod(periods, self%orbit%periods) == 0 .and. recurrence > lies_apart*self%distance) periods = 0
+      if (periods > 0 .and. mod(periods, self%orbit%periods) == 0 .and. recurrence > lies_apart*self%distance) periods = 0
 
    contains
 

@@ -342,7 +342,6 @@ contains
          return
       end if
       item%iteration = item%iteration + 1
-      write (97,'(a,3i5,2es10.2)') 'IT', orbit%periods, item%iteration, pass, item%length/scale, previous/scale
       free = free_long
       if (orbit%periods <= longest_named) free = merge(free_iterations, free_some, orbit%periods == 1)
       if (item%iteration > free .and. item%length > max(least_shrinkage*previous, stagnant_step*scale)) return
