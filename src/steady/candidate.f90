@@ -8,7 +8,7 @@ module spurflex_steady_candidate
    use spurflex_base_kinds, only: wp
    use spurflex_steady_outcome, only: longest_named
    use spurflex_steady_sections, only: longest_period, weighted_norm
-   use spurflex_steady_shooting, only: periodic_orbit
+   use spurflex_steady_shooting, only: periodic_orbit, move_orbit
    use spurflex_steady_transient, only: transient_type
    implicit none
    private
@@ -155,17 +155,17 @@ contains
       !> Mesh periods tried, and what the sections of the transient that far apart differ by [m].
       integer, intent(in) :: tried
       real(wp), intent(in) :: recurrence
-      !> The periodic motion.
-      type(periodic_orbit), intent(in) :: orbit
+      !> The periodic motion; if there is one it becomes the candidate, and its state and monodromy are taken from here.
+      type(periodic_orbit), intent(inout) :: orbit
       !> There is one; it is stable.
       logical, intent(in) :: is_periodic, is_stable
 
       if (.not. is_stable .and. (is_periodic .or. transient%periods > always_tried)) self%missed(tried) = recurrence
       if (.not. is_periodic) return
-      self%orbit = orbit
+      self%distance = weighted_norm(weight, transient%state - orbit%state)
+      call move_orbit(orbit, self%orbit)
       self%is_stable = is_stable
       self%met = transient%periods
-      self%distance = weighted_norm(weight, transient%state - orbit%state)
    end subroutine remember
 
 end module spurflex_steady_candidate

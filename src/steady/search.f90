@@ -14,7 +14,7 @@ module spurflex_steady_search
    use spurflex_steady_outcome, only: steady_motion, status_missing, status_settled, status_not_settled, status_diverged, &
       reason_non_finite, reason_max_periods, motion_unresolved, motion_quasi_periodic, motion_chaotic, motion_of_periods
    use spurflex_steady_sections, only: weighted_norm
-   use spurflex_steady_shooting, only: periodic_orbit, contact_is_kept
+   use spurflex_steady_shooting, only: periodic_orbit, move_orbit, contact_is_kept
    use spurflex_steady_stability, only: find_stable_orbits, largest_multiplier
    use spurflex_steady_transient, only: transient_type, begin_transient, watch_from_now, advance_transients, drifts
    implicit none
@@ -168,20 +168,17 @@ contains
             call candidates(p)%choose(points%weight(:, p), transients(p), scale(i), periods(i), recurrence(i))
          end associate
       end do
-      ! Newton's method begins where the transients are now, not where they get to while they are compared.
-      allocate (near(n))
-      do i = 1, n
-         near(i)%state = transients(sound(i))%state
-         near(i)%periods = periods(i)
-      end do
       known = pack([(i, i=1, n)], [(candidates(sound(i))%may_follow(transients(sound(i))), i=1, n)])
-      call keep_confirmed(sound(known), candidates(sound(known))%orbit)
+      call keep_confirmed(sound(known))
       known = pack([(i, i=1, n)], periods > 0 .and. motions(sound)%status == status_missing)
       sound = sound(known)
-      near = near(known)
       n = size(known)
       if (n == 0) return
-      allocate (found(n), is_periodic(n))
+      allocate (near(n), found(n), is_periodic(n))
+      do i = 1, n
+         near(i)%periods = periods(known(i))
+         near(i)%state = transients(sound(i))%state
+      end do
       call find_stable_orbits(points, sound, scale(known), visitor, near, found, &
                               only_affine=all(transients(sound)%periods == 0), roughly=.not. options%multipliers, &
                               periodic=is_periodic)
@@ -190,26 +187,24 @@ contains
          call candidates(sound(i))%remember(points%weight(:, sound(i)), transients(sound(i)), periods(known(i)), &
                                             recurrence(known(i)), near(i), is_periodic(i), found(i))
       end do
-      known = pack([(i, i=1, n)], found)
-      call keep_confirmed(sound(known), near(known))
+      call keep_confirmed(pack(sound, found))
 
    contains
 
-      !> Keep those orbits that the transients are seen to approach.
-      subroutine keep_confirmed(which, stable)
-         !> Points, and a stable orbit of each, shape (n).
+      !> Keep those candidates that the transients are seen to approach.
+      subroutine keep_confirmed(which)
+         !> Points with a stable candidate, shape (n).
          integer, intent(in) :: which(:)
-         type(periodic_orbit), intent(in) :: stable(:)
 
          logical :: confirmed(size(which))
          integer :: j
 
          confirmed = .true.
-         call confirm_approach(points, which, stable, visitor, transients, confirmed)
+         call confirm_approach(points, which, candidates, visitor, transients, confirmed)
          do j = 1, size(which)
             if (.not. confirmed(j)) cycle
-            call describe_orbit(stable(j), options, motions(which(j)))
-            orbits(which(j)) = stable(j)
+            call describe_orbit(candidates(which(j))%orbit, options, motions(which(j)))
+            call move_orbit(candidates(which(j))%orbit, orbits(which(j)))
          end do
       end subroutine keep_confirmed
 
@@ -235,13 +230,13 @@ contains
    end subroutine describe_orbit
 
    !> Keep the orbits that the transients are on their way to.
-   subroutine confirm_approach(points, members, orbits, visitor, transients, found)
+   subroutine confirm_approach(points, members, candidates, visitor, transients, found)
       !> The points.
       class(ensemble), intent(inout) :: points
       !> Which of them, shape (n).
       integer, intent(in) :: members(:)
-      !> The orbits, shape (n).
-      type(periodic_orbit), intent(in) :: orbits(:)
+      !> What is remembered of each point, with its orbit, shape (points).
+      type(candidate_type), intent(in) :: candidates(:)
       !> Let in between the periods.
       class(attendant), intent(inout) :: visitor
       !> The transients, shape (points); they go on meanwhile.
@@ -261,7 +256,7 @@ contains
             if (k > 0) call advance_transients(points, members(open), transients(members(open))%periods + glance, transients, &
                                                visitor)
             do i = 1, size(open)
-               associate (p => members(open(i)), orbit => orbits(open(i)))
+               associate (p => members(open(i)), orbit => candidates(members(open(i)))%orbit)
                   found(open(i)) = is_there(points, p, orbit, transients(p)%state - orbit%state)
                end associate
             end do
@@ -270,7 +265,7 @@ contains
          return
       end if
       do i = 1, size(open)
-         associate (p => members(open(i)), orbit => orbits(open(i)))
+         associate (p => members(open(i)), orbit => candidates(members(open(i)))%orbit)
             arrives(i) = is_there(points, p, orbit, transients(p)%state - orbit%state)
          end associate
       end do
@@ -278,12 +273,14 @@ contains
       do k = 1, confirmations
          open = pack(open, found(open))
          do i = 1, size(open)
-            predicted(:, i) = matmul(orbits(open(i))%monodromy, transients(members(open(i)))%state - orbits(open(i))%state)
+            associate (orbit => candidates(members(open(i)))%orbit)
+               predicted(:, i) = matmul(orbit%monodromy, transients(members(open(i)))%state - orbit%state)
+            end associate
          end do
-         call advance_transients(points, members(open), transients(members(open))%periods + orbits(open)%periods, transients, &
-                                 visitor)
+         call advance_transients(points, members(open), transients(members(open))%periods &
+                                 + candidates(members(open))%orbit%periods, transients, visitor)
          do i = 1, size(open)
-            associate (transient => transients(members(open(i))), orbit => orbits(open(i)))
+            associate (transient => transients(members(open(i))), orbit => candidates(members(open(i)))%orbit)
                found(open(i)) = transient%sound
                if (.not. found(open(i))) cycle
                away = transient%state - orbit%state

@@ -15,7 +15,7 @@ module spurflex_steady_shooting
    implicit none
    private
 
-   public :: periodic_orbit, find_orbit, find_orbits, floquet_multipliers, advance_periods, contact_is_kept
+   public :: periodic_orbit, move_orbit, find_orbit, find_orbits, floquet_multipliers, advance_periods, contact_is_kept
 
    !> Newton iterations at most; an affine map needs one, a change of the contact pattern a few more.
    integer, parameter :: most_iterations = 12
@@ -402,6 +402,22 @@ contains
          end do
       end do
    end subroutine newton_steps
+
+   !> Move a motion without copying its matrix.
+   pure subroutine move_orbit(from, to)
+      !> The motion; without state and monodromy afterwards.
+      type(periodic_orbit), intent(inout) :: from
+      !> Where to.
+      type(periodic_orbit), intent(inout) :: to
+
+      to%periods = from%periods
+      to%last_step = from%last_step
+      to%smallest = from%smallest
+      to%largest = from%largest
+      to%integrated = from%integrated
+      call move_alloc(from%state, to%state)
+      call move_alloc(from%monodromy, to%monodromy)
+   end subroutine move_orbit
 
    !> The teeth never part on a motion: the map is affine.
    pure function contact_is_kept(half_backlash, orbit) result(kept)
