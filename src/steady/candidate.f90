@@ -26,6 +26,9 @@ module spurflex_steady_candidate
    !> nearer by a factor.
    real(wp), parameter :: near_recurrence = 0.1_wp, clearly_nearer = 0.3_wp, much_clearer = 0.1_wp
 
+   !> Distance, beside the size of the motion, that is none: a shorter period is exact.
+   real(wp), parameter :: no_distance = 1.0e-12_wp
+
    !> The same at which a motion of many mesh periods is looked for at all, and mesh periods before: it is dear, and what it is
    !> not told from, a torus, takes longer to be told.
    real(wp), parameter :: long_recurrence = 0.005_wp
@@ -101,6 +104,7 @@ contains
       distances = [(transient%ring%distance(k), k=1, longest_period)]
       short = 0
       do k = 1, longest_period
+         if (distances(periods) <= no_distance*scale) exit
          if (distances(k) < clearly_nearer*distances(periods)) periods = k
          if (short > 0 .or. periods > longest_named) cycle
          if (distances(periods) <= near_recurrence*scale .and. is_new(periods)) short = periods
