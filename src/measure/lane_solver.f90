@@ -4,21 +4,22 @@ module spurflex_measure_lane_solver
    use spurflex_base_attendant, only: attendant
    use spurflex_base_error, only: error_type
    use spurflex_base_kinds, only: wp
-   use spurflex_integrate_lane_ensemble, only: lane_ensemble, widen
+   use spurflex_integrate_lane_ensemble, only: lane_ensemble
    use spurflex_integrate_lane_observe, only: point_view, new_point_view, lane_view
-   use spurflex_integrate_options, only: solver_options, integrator_collocation, integrator_newmark
+   use spurflex_integrate_options, only: solver_options, integrator_newmark
    use spurflex_integrate_steps, only: aim, better_lane_steps, newmark_lane_steps
-   use spurflex_measure_harmonic_motion, only: series_sampler, measure_harmonics
+   use spurflex_measure_harmonic_motion, only: series_sampler
    use spurflex_measure_lane_motion, only: measure_lanes, quarter_of, parts, begin_of_window, first_half, second_half
+   use spurflex_measure_linear_points, only: harmonics_do, measure_linear
    use spurflex_measure_response, only: response, empty_response, describe_motion, relative_difference, status_inaccurate, &
-      reason_given_steps, contact_kept
+      reason_given_steps
    use spurflex_model_equations, only: equations_type
    use spurflex_model_modal, only: modal_system, new_modal_system, same_modes
-   use spurflex_steady_harmonic, only: harmonic_motion, find_harmonic_motion, section_of
    use spurflex_steady_outcome, only: steady_motion
    use spurflex_steady_search, only: describe_orbit
    use spurflex_steady_sections, only: weighted_norm
-   use spurflex_steady_shooting, only: periodic_orbit, find_orbits, contact_is_kept
+   use spurflex_steady_orbit, only: periodic_orbit
+   use spurflex_steady_shooting, only: find_orbits
    use spurflex_steady_stability, only: find_stable_orbits, reduce_periods
    implicit none
    private
@@ -27,9 +28,6 @@ module spurflex_measure_lane_solver
 
    !> Linear parts that are kept for tiles to come; a few kilobytes each.
    integer, parameter :: most_parts = 256
-
-   !> Distance, beside its size, of the series of a motion that keeps contact from what the lanes found: the error of their steps.
-   real(wp), parameter :: same_motion = 1.0e-2_wp
 
    !> Points in lanes.
    type :: lane_solver
@@ -126,7 +124,8 @@ contains
       integer, allocatable :: open(:), group(:)
       logical :: agreed(size(equations))
 
-      if (harmonics_do(solver%options)) call measure_linear(solver, equations, part, members, motions, orbits, answers, complete)
+      if (harmonics_do(solver%options)) call measure_linear(solver%points, solver%sampler, solver%modal, solver%options%tolerance, &
+                                                            equations, part, members, motions, orbits, answers, complete)
       open = pack(members, .not. complete(members))
       do i = 1, size(equations)
          steps(i) = measuring_steps(solver, equations(i))
@@ -163,59 +162,6 @@ contains
          open = pack(open, steps(open) > 0 .and. .not. complete(open))
       end do
    end subroutine measure_orbits
-
-   !> Motions that keep contact need not be integrated: the steps are free, and no method is asked for that has errors of its own.
-   pure function harmonics_do(options) result(they_do)
-      !> Options.
-      type(solver_options), intent(in) :: options
-      !> They need not.
-      logical :: they_do
-
-      they_do = options%integrator == integrator_collocation .and. options%steps_per_period == 0
-   end function harmonics_do
-
-   !> Measure the motions that keep contact by their Fourier series.
-   subroutine measure_linear(solver, equations, part, members, motions, orbits, answers, complete)
-      !> Solver.
-      type(lane_solver), intent(inout) :: solver
-      !> Equations of motion of each point, shape (n).
-      type(equations_type), intent(in) :: equations(:)
-      !> Linear part of each point, shape (n).
-      integer, intent(in) :: part(:)
-      !> Which of them.
-      integer, intent(in) :: members(:)
-      !> The motions; those measured move to the section of the series, shape (n).
-      type(steady_motion), intent(inout) :: motions(:)
-      !> Their orbits, shape (n).
-      type(periodic_orbit), intent(in) :: orbits(:)
-      !> The responses, shape (n).
-      type(response), intent(inout) :: answers(:)
-      !> The response meets the tolerance, shape (n).
-      logical, intent(inout) :: complete(:)
-
-      type(harmonic_motion) :: series
-      type(response) :: measured
-      real(wp) :: section(solver%points%size)
-      integer :: i
-
-      do i = 1, size(members)
-         associate (p => members(i), modal => solver%modal(part(members(i))))
-            if (motions(p)%periods /= 1 .or. .not. contact_is_kept(solver%points%half_backlash, orbits(p))) cycle
-            call find_harmonic_motion(modal, equations(p), series)
-            if (series%order == 0) cycle
-            section = widen(section_of(modal, series), solver%points%size/2)
-            if (weighted_norm(solver%points%weight(:, p), section - motions(p)%state) > &
-                same_motion*weighted_norm(solver%points%weight(:, p), section)) cycle
-            measured = empty_response()
-            call measure_harmonics(solver%sampler, modal, equations(p), series, measured)
-            if (measured%contact /= contact_kept) cycle
-            motions(p)%state = section
-            call describe_motion(motions(p), measured)
-            answers(p) = measured
-            complete(p) = measured%error_estimate <= aim*solver%options%tolerance
-         end associate
-      end do
-   end subroutine measure_linear
 
    !> Points are measured by Newmark's method, not by the collocation that finds their motions.
    pure function by_newmark(self) result(they_are)

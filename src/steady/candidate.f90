@@ -8,7 +8,7 @@ module spurflex_steady_candidate
    use spurflex_base_kinds, only: wp
    use spurflex_steady_outcome, only: longest_named
    use spurflex_steady_sections, only: longest_period, weighted_norm
-   use spurflex_steady_shooting, only: periodic_orbit, move_orbit
+   use spurflex_steady_orbit, only: periodic_orbit, move_orbit
    use spurflex_steady_transient, only: transient_type
    implicit none
    private

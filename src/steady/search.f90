@@ -14,7 +14,7 @@ module spurflex_steady_search
    use spurflex_steady_outcome, only: steady_motion, status_missing, status_settled, status_not_settled, status_diverged, &
       reason_non_finite, reason_max_periods, motion_unresolved, motion_quasi_periodic, motion_chaotic, motion_of_periods
    use spurflex_steady_sections, only: weighted_norm
-   use spurflex_steady_shooting, only: periodic_orbit, move_orbit, contact_is_kept
+   use spurflex_steady_orbit, only: periodic_orbit, move_orbit, contact_is_kept
    use spurflex_steady_stability, only: find_stable_orbits, largest_multiplier
    use spurflex_steady_transient, only: transient_type, begin_transient, watch_from_now, advance_transients, drifts
    implicit none

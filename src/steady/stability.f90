@@ -6,7 +6,8 @@ module spurflex_steady_stability
    use spurflex_integrate_ensemble, only: ensemble
    use spurflex_steady_batch, only: batch, contracting
    use spurflex_steady_sections, only: weighted_norm
-   use spurflex_steady_shooting, only: periodic_orbit, find_orbits, floquet_multipliers
+   use spurflex_steady_orbit, only: periodic_orbit, floquet_multipliers
+   use spurflex_steady_shooting, only: find_orbits
    implicit none
    private
 

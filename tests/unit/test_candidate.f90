@@ -2,7 +2,7 @@
 module test_candidate
    use spurflex_base_kinds, only: wp, pi
    use spurflex_steady_candidate, only: candidate_type
-   use spurflex_steady_shooting, only: periodic_orbit
+   use spurflex_steady_orbit, only: periodic_orbit
    use spurflex_steady_transient, only: begin_transient, transient_type
    use test_support, only: check, error_type, new_unittest, unittest_type
    implicit none

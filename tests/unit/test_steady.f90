@@ -15,7 +15,8 @@ module test_steady
    use spurflex_steady_outcome, only: motion_unresolved, status_diverged, status_not_settled, status_settled, steady_motion
    use spurflex_steady_search, only: find_steady_motion
    use spurflex_steady_sections, only: longest_period, section_ring, weighted_norm
-   use spurflex_steady_shooting, only: find_orbit, floquet_multipliers, periodic_orbit
+   use spurflex_steady_orbit, only: floquet_multipliers, periodic_orbit
+   use spurflex_steady_shooting, only: find_orbit
    use test_support, only: check, error_type, new_unittest, test_failed, unittest_type
    implicit none
    private
