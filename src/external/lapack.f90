@@ -6,7 +6,7 @@ module spurflex_external_lapack
    implicit none
    private
 
-   public :: invert_positive_definite, invert_complex, eigenvalues, eigenvectors, solve_real
+   public :: invert_positive_definite, invert_complex, eigenvalues, eigenvectors, solve_real, solve_banded
 
    !> Work space of `dgeev` per row of the matrix.
    integer, parameter :: work_per_row = 8
@@ -46,6 +46,14 @@ module spurflex_external_lapack
          complex(wp), intent(inout) :: a(lda, *), b(ldb, *)
          integer, intent(out) :: ipiv(*), info
       end subroutine zgesv
+
+      !> Solution of complex linear equations with a band matrix.
+      subroutine zgbsv(n, kl, ku, nrhs, ab, ldab, ipiv, b, ldb, info)
+         import :: wp
+         integer, intent(in) :: n, kl, ku, nrhs, ldab, ldb
+         complex(wp), intent(inout) :: ab(ldab, *), b(ldb, *)
+         integer, intent(out) :: ipiv(*), info
+      end subroutine zgbsv
 
       !> Solution of real linear equations.
       subroutine dgesv(n, nrhs, a, lda, ipiv, b, ldb, info)
@@ -177,5 +185,23 @@ contains
       call dgesv(n, 1, matrix, n, pivots, right_side, n, info)
       if (info /= 0) call fatal_error(error, 'a matrix is singular (pivot '//to_text(info)//')')
    end subroutine solve_real
+
+   !> Solve complex linear equations with a band matrix in place.
+   subroutine solve_banded(width, band, right_side, error)
+      !> Diagonals below the main one, and above it.
+      integer, intent(in) :: width
+      !> Column j holds column j of the matrix, its element i in row 2 width + 1 + i - j, shape (3 width + 1, n); destroyed.
+      complex(wp), intent(inout), contiguous :: band(:, :)
+      !> Right side before, solution after, shape (n).
+      complex(wp), intent(inout), contiguous :: right_side(:)
+      !> Set where the matrix is singular.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer :: pivots(size(right_side)), n, info
+
+      n = size(right_side)
+      call zgbsv(n, width, width, 1, band, size(band, 1), pivots, right_side, n, info)
+      if (info /= 0) call fatal_error(error, 'a band matrix is singular (pivot '//to_text(info)//')')
+   end subroutine solve_banded
 
 end module spurflex_external_lapack

@@ -3,7 +3,7 @@ module spurflex_integrate_lane_ensemble
    use spurflex_base_kinds, only: wp, i8
    use spurflex_integrate_ensemble, only: ensemble
    use spurflex_integrate_lane_newmark, only: new_newmark_rule, advance_newmark, carry_newmark
-   use spurflex_integrate_lane_rule, only: lanes, most_modes, points, lane_rule, mesh_cycle, lane_gain, lane_record, &
+   use spurflex_integrate_lane_rule, only: lanes, most_modes, points, abreast, lane_rule, mesh_cycle, lane_gain, lane_record, &
       point_rule, new_point_rule, new_mesh_cycle, load_rule
    use spurflex_integrate_lane_step, only: advance_lanes, carry_lane_tangents
    use spurflex_model_equations, only: equations_type
@@ -94,12 +94,15 @@ contains
       !> Steps per mesh period.
       integer, intent(in) :: steps
 
+      integer :: last
+
       if (allocated(self%gain%n)) then
          if (size(self%gain%n, 4) >= steps) return
          deallocate (self%gain%n, self%record%re, self%record%im, self%record%force)
       end if
-      allocate (self%gain%n(lanes, points, points, steps), self%record%re(lanes, most_modes, 0:steps), &
-                self%record%im(lanes, most_modes, 0:steps), self%record%force(lanes, 0:steps), source=0.0_wp)
+      last = steps + abreast - 1
+      allocate (self%gain%n(lanes, points, points, steps), self%record%re(lanes, most_modes, 0:last), &
+                self%record%im(lanes, most_modes, 0:last), self%record%force(lanes, 0:last), source=0.0_wp)
    end subroutine reserve
 
    !> Put a point into a lane.

@@ -2,7 +2,7 @@
 !> The polynomials of degree five between them miss some 1e-5 of a motion with 16 steps, and less by the sixth power with more.
 module spurflex_integrate_lane_observe
    use spurflex_base_kinds, only: wp, pi
-   use spurflex_integrate_lane_rule, only: lanes, most_modes, lane_record
+   use spurflex_integrate_lane_rule, only: lanes, most_modes, abreast, lane_record
    use spurflex_integrate_period_map, only: orbit_type, observables, reserve_orbit
    use spurflex_model_modal, only: modal_system
    implicit none
@@ -85,26 +85,41 @@ contains
       !> Steps per mesh period.
       integer, intent(in) :: steps
 
-      real(wp) :: value(lanes)
-      integer :: s, order, i, j, l
+      real(wp), dimension(lanes) :: first, second, third, fourth
+      integer :: s, order, i, j, l, last
 
+      last = steps + abreast - 1
       if (allocated(self%seen)) then
-         if (ubound(self%seen, 4) < steps) deallocate (self%seen)
+         if (ubound(self%seen, 4) < last) deallocate (self%seen)
       end if
-      if (.not. allocated(self%seen)) allocate (self%seen(lanes, observables, orders, 0:steps))
-      do s = 0, steps
+      if (.not. allocated(self%seen)) allocate (self%seen(lanes, observables, orders, 0:last))
+      ! Four steps abreast read the coefficients once; what lies behind the last step means nothing.
+      do s = 0, steps, abreast
          do order = 1, orders
             do i = 1, observables
                do l = 1, lanes
-                  value(l) = self%force(l, i, order)*record%force(l, s)
+                  first(l) = self%force(l, i, order)*record%force(l, s)
+                  second(l) = self%force(l, i, order)*record%force(l, s + 1)
+                  third(l) = self%force(l, i, order)*record%force(l, s + 2)
+                  fourth(l) = self%force(l, i, order)*record%force(l, s + 3)
                end do
                do j = 1, modes
                   do l = 1, lanes
-                     value(l) = value(l) + self%re(l, j, i, order)*record%re(l, j, s) - self%im(l, j, i, order)*record%im(l, j, s)
+                     first(l) = first(l) + self%re(l, j, i, order)*record%re(l, j, s) &
+                                - self%im(l, j, i, order)*record%im(l, j, s)
+                     second(l) = second(l) + self%re(l, j, i, order)*record%re(l, j, s + 1) &
+                                 - self%im(l, j, i, order)*record%im(l, j, s + 1)
+                     third(l) = third(l) + self%re(l, j, i, order)*record%re(l, j, s + 2) &
+                                - self%im(l, j, i, order)*record%im(l, j, s + 2)
+                     fourth(l) = fourth(l) + self%re(l, j, i, order)*record%re(l, j, s + 3) &
+                                 - self%im(l, j, i, order)*record%im(l, j, s + 3)
                   end do
                end do
                do l = 1, lanes
-                  self%seen(l, i, order, s) = value(l)
+                  self%seen(l, i, order, s) = first(l)
+                  self%seen(l, i, order, s + 1) = second(l)
+                  self%seen(l, i, order, s + 2) = third(l)
+                  self%seen(l, i, order, s + 3) = fourth(l)
                end do
             end do
          end do

@@ -14,7 +14,7 @@ module spurflex_integrate_lane_rule
    implicit none
    private
 
-   public :: lanes, most_modes, points
+   public :: lanes, most_modes, points, abreast
    public :: lane_rule, mesh_cycle, lane_gain, lane_record, point_rule, new_point_rule, new_mesh_cycle, load_rule
 
    !> Lanes: one or two vectors of the processor.
@@ -56,6 +56,9 @@ module spurflex_integrate_lane_rule
       !> Shape (lanes, points, points, steps).
       real(wp), allocatable :: n(:, :, :, :)
    end type lane_gain
+
+   !> Steps of a record that are looked at together: it has room for this many from any of its steps on.
+   integer, parameter :: abreast = 4
 
    !> A recorded period.
    type :: lane_record

@@ -8,7 +8,9 @@ module spurflex_measure_lane_solver
    use spurflex_integrate_lane_observe, only: point_view, new_point_view, lane_view
    use spurflex_integrate_options, only: solver_options, integrator_newmark
    use spurflex_integrate_steps, only: aim, better_lane_steps, newmark_lane_steps
+   use spurflex_measure_harmonic_motion, only: series_sampler
    use spurflex_measure_lane_motion, only: measure_lanes, quarter_of, parts, begin_of_window, first_half, second_half
+   use spurflex_measure_linear_points, only: harmonics_do, measure_linear
    use spurflex_measure_response, only: response, empty_response, describe_motion, relative_difference, status_inaccurate, &
       reason_given_steps
    use spurflex_model_equations, only: equations_type
@@ -16,7 +18,8 @@ module spurflex_measure_lane_solver
    use spurflex_steady_outcome, only: steady_motion
    use spurflex_steady_search, only: describe_orbit
    use spurflex_steady_sections, only: weighted_norm
-   use spurflex_steady_shooting, only: periodic_orbit, find_orbits
+   use spurflex_steady_orbit, only: periodic_orbit
+   use spurflex_steady_shooting, only: find_orbits
    use spurflex_steady_stability, only: find_stable_orbits, reduce_periods
    implicit none
    private
@@ -36,6 +39,8 @@ module spurflex_measure_lane_solver
       integer :: steps = 0
       !> Room for what the lanes see.
       type(lane_view) :: view
+      !> Samples the series of motions that keep contact.
+      type(series_sampler) :: sampler
       !> Linear parts met so far, with their modes and displacements.
       integer :: parts = 0
       type(equations_type), allocatable :: linear(:)
@@ -119,7 +124,9 @@ contains
       integer, allocatable :: open(:), group(:)
       logical :: agreed(size(equations))
 
-      open = members
+      if (harmonics_do(solver%options)) call measure_linear(solver%points, solver%sampler, solver%modal, solver%options%tolerance, &
+                                                            equations, part, members, motions, orbits, answers, complete)
+      open = pack(members, .not. complete(members))
       do i = 1, size(equations)
          steps(i) = measuring_steps(solver, equations(i))
       end do

@@ -23,7 +23,8 @@ module spurflex_measure_point
    use spurflex_steady_outcome, only: steady_motion
    use spurflex_steady_search, only: find_steady_motion, describe_orbit
    use spurflex_steady_sections, only: weighted_norm
-   use spurflex_steady_shooting, only: periodic_orbit, find_orbit
+   use spurflex_steady_orbit, only: periodic_orbit
+   use spurflex_steady_shooting, only: find_orbit
    use spurflex_steady_stability, only: find_stable_orbits
    implicit none
    private

@@ -17,7 +17,7 @@ module spurflex_measure_points
    use spurflex_model_modal, only: to_modes, from_modes
    use spurflex_steady_outcome, only: steady_motion, status_diverged
    use spurflex_steady_search, only: find_steady_motions
-   use spurflex_steady_shooting, only: periodic_orbit
+   use spurflex_steady_orbit, only: periodic_orbit
    implicit none
    private
 

@@ -20,7 +20,8 @@ module spurflex_measure_recorder
    use spurflex_model_equations, only: equations_type
    use spurflex_steady_outcome, only: periods_of_motion
    use spurflex_steady_sections, only: weighted_norm
-   use spurflex_steady_shooting, only: periodic_orbit, find_orbit
+   use spurflex_steady_orbit, only: periodic_orbit
+   use spurflex_steady_shooting, only: find_orbit
    implicit none
    private
 

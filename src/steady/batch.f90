@@ -110,9 +110,9 @@ contains
       !> They do.
       logical, intent(out) :: it_does(batch)
 
-      real(wp) :: square(batch, n, n), column(batch, n)
+      real(wp) :: square(batch, n, n)
       real(wp), dimension(batch) :: norm, logarithm
-      integer :: i, j, k, l, s
+      integer :: i, j, l, s
 
       it_does = .false.
       ! The power is kept of norm one and the logarithm of its norm apart, so that nothing overflows.
@@ -150,19 +150,52 @@ contains
                end do
             end do
          end do
-         do j = 1, n
-            column = 0.0_wp
-            do k = 1, n
-               do i = 1, n
-                  do l = 1, batch
-                     column(l, i) = column(l, i) + matrix(l, i, k)*matrix(l, k, j)
-                  end do
-               end do
-            end do
-            square(:, :, j) = column
-         end do
+         call multiply(n, matrix, square)
          matrix = square
       end do
    end subroutine contracting
+
+   !> Square matrices. Four rows abreast read the element they share once.
+   pure subroutine multiply(n, matrix, square)
+      !> Rows.
+      integer, intent(in) :: n
+      !> Matrices.
+      real(wp), intent(in) :: matrix(batch, n, n)
+      !> Their squares.
+      real(wp), intent(out) :: square(batch, n, n)
+
+      real(wp), dimension(batch) :: first, second, third, fourth
+      integer :: i, j, k, l
+
+      do j = 1, n
+         do i = 1, n - 3, 4
+            first = 0.0_wp
+            second = 0.0_wp
+            third = 0.0_wp
+            fourth = 0.0_wp
+            do k = 1, n
+               do l = 1, batch
+                  first(l) = first(l) + matrix(l, i, k)*matrix(l, k, j)
+                  second(l) = second(l) + matrix(l, i + 1, k)*matrix(l, k, j)
+                  third(l) = third(l) + matrix(l, i + 2, k)*matrix(l, k, j)
+                  fourth(l) = fourth(l) + matrix(l, i + 3, k)*matrix(l, k, j)
+               end do
+            end do
+            square(:, i, j) = first
+            square(:, i + 1, j) = second
+            square(:, i + 2, j) = third
+            square(:, i + 3, j) = fourth
+         end do
+         do i = n - mod(n, 4) + 1, n
+            first = 0.0_wp
+            do k = 1, n
+               do l = 1, batch
+                  first(l) = first(l) + matrix(l, i, k)*matrix(l, k, j)
+               end do
+            end do
+            square(:, i, j) = first
+         end do
+      end do
+   end subroutine multiply
 
 end module spurflex_steady_batch

@@ -10,11 +10,11 @@ module spurflex_steady_search
    use spurflex_integrate_ensemble, only: ensemble, solo_ensemble, new_solo
    use spurflex_integrate_options, only: solver_options
    use spurflex_integrate_period_map, only: period_map
+   use spurflex_steady_candidate, only: candidate_type
    use spurflex_steady_outcome, only: steady_motion, status_missing, status_settled, status_not_settled, status_diverged, &
-      reason_non_finite, reason_max_periods, motion_unresolved, motion_quasi_periodic, motion_chaotic, motion_of_periods, &
-      longest_named
+      reason_non_finite, reason_max_periods, motion_unresolved, motion_quasi_periodic, motion_chaotic, motion_of_periods
    use spurflex_steady_sections, only: weighted_norm
-   use spurflex_steady_shooting, only: periodic_orbit, contact_is_kept
+   use spurflex_steady_orbit, only: periodic_orbit, move_orbit, contact_is_kept
    use spurflex_steady_stability, only: find_stable_orbits, largest_multiplier
    use spurflex_steady_transient, only: transient_type, begin_transient, watch_from_now, advance_transients, drifts
    implicit none
@@ -24,9 +24,6 @@ module spurflex_steady_search
 
    !> Mesh periods after which the transient is first searched, if the start itself is no good; doubled each time.
    integer, parameter :: first_look = 12
-
-   !> Distance between sections, beside the size of the motion, at which a motion of many mesh periods is looked for.
-   real(wp), parameter :: long_recurrence = 0.005_wp
 
    !> Mesh periods after which a transient is looked at again that should settle on a motion that keeps contact.
    integer, parameter :: glance = 2
@@ -96,6 +93,7 @@ contains
       type(periodic_orbit), intent(out) :: orbits(:)
 
       type(transient_type) :: transients(size(motions))
+      type(candidate_type) :: candidates(size(motions))
       integer :: next_look, i
       integer, allocatable :: left(:)
       logical :: is_last
@@ -106,7 +104,7 @@ contains
       left = [(i, i=1, size(motions))]
       next_look = first_look
       do
-         call look_for_orbits(points, left, options, visitor, transients, motions, orbits)
+         call look_for_orbits(points, left, options, visitor, transients, candidates, motions, orbits)
          do i = 1, size(left)
             if (motions(left(i))%status /= status_missing .or. .not. transients(left(i))%sound) cycle
             call classify(transients(left(i)), options%max_periods, motions(left(i)))
@@ -136,8 +134,8 @@ contains
       end do
    end subroutine find_steady_motions
 
-   !> Look for stable periodic motions that the transients approach.
-   subroutine look_for_orbits(points, members, options, visitor, transients, motions, orbits)
+   !> Look for stable periodic motions that the transients approach: those met before, then others.
+   subroutine look_for_orbits(points, members, options, visitor, transients, candidates, motions, orbits)
       !> The points.
       class(ensemble), intent(inout) :: points
       !> Which of them, shape (n).
@@ -148,43 +146,68 @@ contains
       class(attendant), intent(inout) :: visitor
       !> The transients, shape (points); they go on while they are compared.
       type(transient_type), intent(inout) :: transients(:)
+      !> What is remembered of each point, shape (points).
+      type(candidate_type), intent(inout) :: candidates(:)
       !> The motions that are found, shape (points).
       type(steady_motion), intent(inout) :: motions(:)
       !> Their orbits, shape (points).
       type(periodic_orbit), intent(inout) :: orbits(:)
 
-      type(periodic_orbit) :: near(size(members))
-      integer, allocatable :: sound(:)
-      real(wp) :: scale(size(members)), distance
-      logical :: found(size(members)), promising(size(members))
-      integer :: i, p
+      type(periodic_orbit), allocatable :: near(:)
+      integer, allocatable :: sound(:), known(:), periods(:)
+      real(wp), allocatable :: scale(:), recurrence(:)
+      logical, allocatable :: found(:), is_periodic(:)
+      integer :: i, n
 
       sound = pack(members, transients(members)%sound)
-      promising = .true.
-      do i = 1, size(sound)
-         p = sound(i)
-         near(i)%state = transients(p)%state
-         call transients(p)%ring%nearest(near(i)%periods, distance)
-         scale(i) = max(transients(p)%ring%scale(), points%half_backlash, tiny(1.0_wp))
-         promising(i) = near(i)%periods <= longest_named .or. distance <= long_recurrence*scale(i)
+      n = size(sound)
+      allocate (periods(n), scale(n), recurrence(n))
+      do i = 1, n
+         associate (p => sound(i))
+            scale(i) = max(transients(p)%ring%scale(), points%half_backlash, tiny(1.0_wp))
+            call candidates(p)%choose(points%weight(:, p), transients(p), scale(i), periods(i), recurrence(i))
+         end associate
       end do
-      near(:count(promising(:size(sound)))) = pack(near(:size(sound)), promising(:size(sound)))
-      scale(:count(promising(:size(sound)))) = pack(scale(:size(sound)), promising(:size(sound)))
-      sound = pack(sound, promising(:size(sound)))
-      associate (n => size(sound))
-         if (n == 0) return
-         call find_stable_orbits(points, sound, scale(:n), visitor, near(:n), found(:n), &
-                                 only_affine=all(transients(sound)%periods == 0), roughly=.not. options%multipliers)
-         do i = 1, n
-            motions(sound(i))%periods_integrated = motions(sound(i))%periods_integrated + near(i)%integrated
+      known = pack([(i, i=1, n)], [(candidates(sound(i))%may_follow(transients(sound(i))), i=1, n)])
+      call keep_confirmed(sound(known))
+      known = pack([(i, i=1, n)], periods > 0 .and. motions(sound)%status == status_missing)
+      sound = sound(known)
+      n = size(known)
+      if (n == 0) return
+      allocate (near(n), found(n), is_periodic(n))
+      do i = 1, n
+         near(i)%periods = periods(known(i))
+         near(i)%state = transients(sound(i))%state
+      end do
+      call find_stable_orbits(points, sound, scale(known), visitor, near, found, &
+                              only_affine=all(transients(sound)%periods == 0), roughly=.not. options%multipliers, &
+                              periodic=is_periodic)
+      do i = 1, n
+         motions(sound(i))%periods_integrated = motions(sound(i))%periods_integrated + near(i)%integrated
+         call candidates(sound(i))%remember(points%weight(:, sound(i)), transients(sound(i)), periods(known(i)), &
+                                            recurrence(known(i)), near(i), is_periodic(i), found(i))
+      end do
+      call keep_confirmed(pack(sound, found))
+
+   contains
+
+      !> Keep those candidates that the transients are seen to approach.
+      subroutine keep_confirmed(which)
+         !> Points with a stable candidate, shape (n).
+         integer, intent(in) :: which(:)
+
+         logical :: confirmed(size(which))
+         integer :: j
+
+         confirmed = .true.
+         call confirm_approach(points, which, candidates, visitor, transients, confirmed)
+         do j = 1, size(which)
+            if (.not. confirmed(j)) cycle
+            call describe_orbit(candidates(which(j))%orbit, options, motions(which(j)))
+            call move_orbit(candidates(which(j))%orbit, orbits(which(j)))
          end do
-         call confirm_approach(points, sound, near(:n), visitor, transients, found(:n))
-         do i = 1, n
-            if (.not. found(i)) cycle
-            call describe_orbit(near(i), options, motions(sound(i)))
-            orbits(sound(i)) = near(i)
-         end do
-      end associate
+      end subroutine keep_confirmed
+
    end subroutine look_for_orbits
 
    !> The motion on a stable orbit.
@@ -207,13 +230,13 @@ contains
    end subroutine describe_orbit
 
    !> Keep the orbits that the transients are on their way to.
-   subroutine confirm_approach(points, members, orbits, visitor, transients, found)
+   subroutine confirm_approach(points, members, candidates, visitor, transients, found)
       !> The points.
       class(ensemble), intent(inout) :: points
       !> Which of them, shape (n).
       integer, intent(in) :: members(:)
-      !> The orbits, shape (n).
-      type(periodic_orbit), intent(in) :: orbits(:)
+      !> What is remembered of each point, with its orbit, shape (points).
+      type(candidate_type), intent(in) :: candidates(:)
       !> Let in between the periods.
       class(attendant), intent(inout) :: visitor
       !> The transients, shape (points); they go on meanwhile.
@@ -233,7 +256,7 @@ contains
             if (k > 0) call advance_transients(points, members(open), transients(members(open))%periods + glance, transients, &
                                                visitor)
             do i = 1, size(open)
-               associate (p => members(open(i)), orbit => orbits(open(i)))
+               associate (p => members(open(i)), orbit => candidates(members(open(i)))%orbit)
                   found(open(i)) = is_there(points, p, orbit, transients(p)%state - orbit%state)
                end associate
             end do
@@ -242,7 +265,7 @@ contains
          return
       end if
       do i = 1, size(open)
-         associate (p => members(open(i)), orbit => orbits(open(i)))
+         associate (p => members(open(i)), orbit => candidates(members(open(i)))%orbit)
             arrives(i) = is_there(points, p, orbit, transients(p)%state - orbit%state)
          end associate
       end do
@@ -250,12 +273,14 @@ contains
       do k = 1, confirmations
          open = pack(open, found(open))
          do i = 1, size(open)
-            predicted(:, i) = matmul(orbits(open(i))%monodromy, transients(members(open(i)))%state - orbits(open(i))%state)
+            associate (orbit => candidates(members(open(i)))%orbit)
+               predicted(:, i) = matmul(orbit%monodromy, transients(members(open(i)))%state - orbit%state)
+            end associate
          end do
-         call advance_transients(points, members(open), transients(members(open))%periods + orbits(open)%periods, transients, &
-                                 visitor)
+         call advance_transients(points, members(open), transients(members(open))%periods &
+                                 + candidates(members(open))%orbit%periods, transients, visitor)
          do i = 1, size(open)
-            associate (transient => transients(members(open(i))), orbit => orbits(open(i)))
+            associate (transient => transients(members(open(i))), orbit => candidates(members(open(i)))%orbit)
                found(open(i)) = transient%sound
                if (.not. found(open(i))) cycle
                away = transient%state - orbit%state

@@ -1,4 +1,4 @@
-!> The latest sections of a motion at the mesh period, and after how many periods they repeat.
+!> The latest sections of a motion at the mesh period, and how nearly they repeat.
 module spurflex_steady_sections
    use spurflex_base_kinds, only: wp
    implicit none
@@ -8,9 +8,6 @@ module spurflex_steady_sections
 
    !> Longest motion looked for, in mesh periods.
    integer, parameter :: longest_period = 64
-
-   !> How much nearer a longer period must come than a shorter one to be preferred.
-   real(wp), parameter :: clearly_nearer = 0.1_wp
 
    !> The latest sections.
    type :: section_ring
@@ -26,8 +23,8 @@ module spurflex_steady_sections
       procedure :: reset
       !> Take a section.
       procedure :: add
-      !> The period with which the motion seems to repeat, and how nearly.
-      procedure :: nearest
+      !> How nearly the motion repeats after some periods.
+      procedure :: distance
       !> How large the motion is.
       procedure :: scale => largest_norm
    end type section_ring
@@ -58,28 +55,19 @@ contains
       self%seen = self%seen + 1
    end subroutine add
 
-   !> The period with which the motion comes nearest to repeating; a longer one only where it is clearly nearer.
-   pure subroutine nearest(self, period, distance)
+   !> Weighted distance of the latest section from the one some periods ago [m].
+   pure function distance(self, periods)
       !> Ring.
       class(section_ring), intent(in) :: self
-      !> Period in mesh periods.
-      integer, intent(out) :: period
-      !> Weighted distance of the sections that far apart [m].
-      real(wp), intent(out) :: distance
+      !> Mesh periods.
+      integer, intent(in) :: periods
+      !> The distance; huge if there is no such section yet.
+      real(wp) :: distance
 
-      real(wp) :: d
-      integer :: k
-
-      period = 1
       distance = huge(1.0_wp)
-      do k = 1, min(longest_period, self%seen - 1)
-         d = weighted_norm(self%weight, self%sections(:, column(self, 0)) - self%sections(:, column(self, k)))
-         if (d < clearly_nearer*distance) then
-            period = k
-            distance = d
-         end if
-      end do
-   end subroutine nearest
+      if (periods > min(longest_period, self%seen - 1)) return
+      distance = weighted_norm(self%weight, self%sections(:, column(self, 0)) - self%sections(:, column(self, periods)))
+   end function distance
 
    !> Largest norm among the sections [m].
    pure function largest_norm(self) result(norm)

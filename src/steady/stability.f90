@@ -6,7 +6,8 @@ module spurflex_steady_stability
    use spurflex_integrate_ensemble, only: ensemble
    use spurflex_steady_batch, only: batch, contracting
    use spurflex_steady_sections, only: weighted_norm
-   use spurflex_steady_shooting, only: periodic_orbit, find_orbits, floquet_multipliers
+   use spurflex_steady_orbit, only: periodic_orbit, floquet_multipliers
+   use spurflex_steady_shooting, only: find_orbits
    implicit none
    private
 
@@ -18,7 +19,7 @@ module spurflex_steady_stability
 contains
 
    !> Find stable periodic motions of several points, each near a state.
-   subroutine find_stable_orbits(points, members, scale, visitor, orbits, found, only_affine, roughly)
+   subroutine find_stable_orbits(points, members, scale, visitor, orbits, found, only_affine, roughly, periodic)
       !> The points.
       class(ensemble), intent(inout) :: points
       !> Which of them, shape (n).
@@ -36,8 +37,11 @@ contains
       logical, intent(in), optional :: only_affine
       !> The monodromy may be that of a state nearby.
       logical, intent(in), optional :: roughly
+      !> There is one, stable or not, shape (n).
+      logical, intent(out), optional :: periodic(:)
 
       call find_orbits(points, members, scale, visitor, orbits, found, only_affine, roughly=roughly)
+      if (present(periodic)) periodic = found
       call reduce_periods(points, members, found, visitor, orbits)
       call keep_stable(orbits, found)
    end subroutine find_stable_orbits

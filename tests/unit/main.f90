@@ -24,6 +24,8 @@ program unit_tests
    use test_shooting, only: collect_shooting
    use test_search, only: collect_search
    use test_kahraman_singh, only: collect_kahraman_singh
+   use test_candidate, only: collect_candidate
+   use test_harmonic, only: collect_harmonic
    use test_lanes, only: collect_lanes
    use test_spectrum, only: collect_spectrum
    use test_support, only: new_testsuite, run_testsuite, select_suite, testsuite_type
@@ -55,6 +57,8 @@ program unit_tests
             new_testsuite('modal', collect_modal), &
             new_testsuite('exponential', collect_exponential), &
             new_testsuite('crossings', collect_crossings), &
+            new_testsuite('harmonic', collect_harmonic), &
+            new_testsuite('candidate', collect_candidate), &
             new_testsuite('shooting', collect_shooting), &
             new_testsuite('search', collect_search), &
             new_testsuite('kahraman_singh', collect_kahraman_singh), &

@@ -7,7 +7,7 @@ module period_maps
    use spurflex_integrate_period_map, only: period_map
    use spurflex_model_equations, only: equations_type, new_equations
    use spurflex_model_parameters, only: gear_pair, gearbox, load_type, operating_point, support_rigid
-   use spurflex_steady_shooting, only: floquet_multipliers, periodic_orbit
+   use spurflex_steady_orbit, only: floquet_multipliers, periodic_orbit
    use test_support, only: error_type, test_failed
    implicit none
    private

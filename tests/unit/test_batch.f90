@@ -17,7 +17,8 @@ module test_batch
    use spurflex_model_modal, only: modal_system, new_modal_system
    use spurflex_steady_batch, only: batch, contracting, solve_batch
    use spurflex_steady_sections, only: weighted_norm
-   use spurflex_steady_shooting, only: find_orbit, find_orbits, periodic_orbit
+   use spurflex_steady_orbit, only: periodic_orbit
+   use spurflex_steady_shooting, only: find_orbit, find_orbits
    use spurflex_steady_stability, only: find_stable_orbits
    use spurflex_steady_transient, only: advance_transients, begin_transient, transient_type, watch_from_now
    use test_support, only: check, error_type, new_unittest, test_failed, unittest_type

@@ -8,7 +8,8 @@ module test_kahraman_singh
    use spurflex_base_text, only: to_text
    use spurflex_integrate_options, only: integrator_collocation
    use spurflex_integrate_period_map, only: period_map
-   use spurflex_steady_shooting, only: advance_periods, find_orbit, periodic_orbit
+   use spurflex_steady_orbit, only: periodic_orbit
+   use spurflex_steady_shooting, only: advance_periods, find_orbit
    use test_support, only: check, error_type, new_unittest, test_failed, unittest_type
    implicit none
    private

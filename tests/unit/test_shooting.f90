@@ -14,7 +14,8 @@ module test_shooting
    use spurflex_model_equations, only: equations_type, new_equations
    use spurflex_steady_lyapunov, only: lyapunov_sum
    use spurflex_steady_sections, only: weighted_norm
-   use spurflex_steady_shooting, only: advance_periods, find_orbit, floquet_multipliers, periodic_orbit
+   use spurflex_steady_orbit, only: floquet_multipliers, periodic_orbit
+   use spurflex_steady_shooting, only: advance_periods, find_orbit
    use test_support, only: check, error_type, new_unittest, test_failed, unittest_type
    implicit none
    private
