@@ -5,7 +5,8 @@ module spurflex_external_file_watch
    use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_int64_t, c_loc, c_long, c_null_ptr, c_ptr, c_size_t
    use spurflex_base_error, only: error_type, fatal_error
    use spurflex_base_text, only: to_text
-   use spurflex_external_posix, only: c_fclose, c_fileno, c_fopen, c_string, errno, failure_reason, make_folder, sync_file
+   use spurflex_external_posix, only: c_fclose, c_fileno, c_fopen, c_fseek, c_string, errno, failure_reason, &
+      from_beginning, make_folder, sync_file
    implicit none
    private
 
@@ -27,8 +28,6 @@ module spurflex_external_file_watch
    integer, parameter :: most_attempts = 100
    !> Bytes copied at once.
    integer, parameter :: buffer_bytes = 1048576
-   !> Count from the beginning of the file (`SEEK_SET`).
-   integer(c_int), parameter :: from_beginning = 0_c_int
 
    !> A file that is watched.
    type :: file_watch
@@ -57,19 +56,6 @@ module spurflex_external_file_watch
          !> 0, or -1 on failure.
          integer(c_int) :: failed
       end function c_statx
-
-      !> Go to a place of a stream.
-      function c_fseek(stream, offset, from) bind(c, name='fseek') result(failed)
-         import :: c_int, c_long, c_ptr
-         !> The stream.
-         type(c_ptr), value :: stream
-         !> Where to.
-         integer(c_long), value :: offset
-         !> From where.
-         integer(c_int), value :: from
-         !> 0, or -1 on failure.
-         integer(c_int) :: failed
-      end function c_fseek
 
       !> Read from a stream.
       function c_fread(buffer, bytes, count, stream) bind(c, name='fread') result(done)

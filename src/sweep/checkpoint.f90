@@ -2,10 +2,10 @@
 module spurflex_sweep_checkpoint
    use mpi_f08, only: MPI_Comm, MPI_IN_PLACE, MPI_INTEGER8, MPI_LOGICAL, MPI_MAX, mpi_allreduce, mpi_bcast, mpi_comm_rank
    use spurflex_base_checksum, only: extended
-   use spurflex_base_error, only: error_type, fatal_error, exit_stopped
+   use spurflex_base_error, only: error_type, fatal_error, exit_mismatch, exit_stopped
    use spurflex_base_kinds, only: i4, i8, wp
    use spurflex_external_file_watch, only: watch_file, save_contents, end_watch
-   use spurflex_external_posix, only: check_writable
+   use spurflex_external_posix, only: check_writable, is_link
    use spurflex_io_agreement, only: share_error
    use spurflex_io_case, only: case_type
    use spurflex_io_provenance, only: provenance_type, collect_provenance
@@ -82,6 +82,10 @@ contains
       if (stops) then
          call fatal_error(error, "nothing done: the stop file '"//stop_file(case)//"' is there; remove it and run the same "// &
                           'command again to go on', exit_stopped)
+      else if (is_link(case%output%file) .and. (fresh .or. .not. exists)) then
+         ! The new file would take the place of the link, on another disk perhaps.
+         call fatal_error(error, "'"//case%output%file//"' is a link; a new file is not made in its place. Name the file "// &
+                          'itself in the deck, or remove the link', exit_mismatch)
       else if (exists .and. .not. fresh) then
          call check_writable(case%output%file, error)
       else

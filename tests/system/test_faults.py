@@ -351,6 +351,35 @@ def test_foreign_file_at_the_name_of_the_new_one_is_left_alone(root, run, tmp_pa
         assert not part.exists()
 
 
+def test_links_are_followed_but_not_replaced(root, run, tmp_path):
+    deck = map_deck(root, tmp_path, rows=2, speeds=5, file="link.h5")
+    (tmp_path / "link.h5").symlink_to("disk/map.h5")
+    (tmp_path / "disk").mkdir()
+    done = run(deck, ranks=2)
+    assert done.returncode == EXIT_MISMATCH
+    assert "'link.h5' is a link" in done.stderr
+    (tmp_path / "link.h5").unlink()
+    assert run(deck).returncode == EXIT_COMPLETE
+    (tmp_path / "link.h5").rename(tmp_path / "disk" / "map.h5")
+    (tmp_path / "link.h5").symlink_to("disk/map.h5")
+    before = (tmp_path / "disk" / "map.h5").read_bytes()
+    done = run(deck, ranks=2)
+    assert done.returncode == EXIT_COMPLETE, done.stderr
+    assert "nothing to do" in done.stdout
+    assert run("--fresh", deck, ranks=2).returncode == EXIT_MISMATCH
+    assert (tmp_path / "link.h5").is_symlink()
+    assert (tmp_path / "disk" / "map.h5").read_bytes() == before
+
+
+def test_pipe_in_place_of_the_result_file(root, run, tmp_path):
+    """Nobody waits for what never comes."""
+    deck = map_deck(root, tmp_path, rows=2, speeds=5)
+    os.mkfifo(tmp_path / "map.h5")
+    done = run(deck, ranks=2, timeout=60)
+    assert done.returncode == EXIT_INTERNAL
+    assert "cannot write to 'map.h5': Illegal seek" in done.stderr
+
+
 # Processes -----------------------------------------------------------------------------------
 
 
