@@ -35,8 +35,8 @@ module spurflex_external_process
 
 contains
 
-   !> Spare Open MPI the search for networks where all ranks are on one machine, and a daemon where there is one process only:
-   !> more than half of its start. What the user has set stays; other MPI libraries take no notice.
+   !> Spare Open MPI the search for networks where all ranks are on one machine: half of its start. What the user has set stays;
+   !> other MPI libraries take no notice.
    subroutine hasten_mpi_start()
       character(len=:), allocatable :: ranks, here
       integer(c_int) :: status
@@ -51,9 +51,9 @@ contains
       ranks = value_of('OMPI_COMM_WORLD_SIZE')
       here = value_of('OMPI_COMM_WORLD_LOCAL_SIZE')
       if (.not. alone .and. (ranks == '' .or. here /= ranks)) return
-      ! A failure costs time only.
+      ! A failure costs time only. The daemon of a single process stays, though it could be spared too: it gives each process a
+      ! folder of its own for what Open MPI keeps, without which several of them get into each other's way.
       status = c_setenv('OMPI_MCA_pml'//c_null_char, 'ob1'//c_null_char, keep)
-      if (alone) status = c_setenv('OMPI_MCA_ess_singleton_isolated'//c_null_char, '1'//c_null_char, keep)
    end subroutine hasten_mpi_start
 
    !> Value of a variable of the environment.
