@@ -2,8 +2,8 @@
 program spurflex_main
    use mpi_f08, only: MPI_COMM_WORLD, mpi_abort, mpi_comm_rank, mpi_finalize, mpi_init
    use spurflex, only: action_check, action_help, action_keys, action_run, action_version, case_type, command_type, &
-      describe_ends, describe_plan, error_type, excerpt, exit_complete, exit_process, key_reference, logger, new_logger, &
-      parse_command_line, run_case, share_case, usage, version_text
+      describe_ends, describe_plan, error_type, excerpt, exit_complete, exit_process, hasten_mpi_start, key_reference, logger, &
+      new_logger, parse_command_line, run_case, share_case, usage, version_text, watch_for_drain
    implicit none
 
    type(command_type) :: command
@@ -13,6 +13,9 @@ program spurflex_main
    integer :: rank, code
 
    code = exit_complete
+   ! Whoever asks for a drain may do so while MPI starts, which can take long on a cluster.
+   call watch_for_drain()
+   call hasten_mpi_start()
    call mpi_init()
    call mpi_comm_rank(MPI_COMM_WORLD, rank)
    log = new_logger(active=rank == 0)

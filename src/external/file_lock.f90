@@ -120,7 +120,8 @@ contains
             lock%stream = c_null_ptr
             if (reason == error_would_block) then
                call fatal_error(error, "another run ("//holder//") holds '"//path//"'", exit_mismatch)
-            else
+            else if (holder == '') then
+               ! No locks here: no lock file either.
                call remove_file(path, error)
             end if
             return

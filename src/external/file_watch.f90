@@ -4,7 +4,9 @@
 module spurflex_external_file_watch
    use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_int64_t, c_loc, c_long, c_null_ptr, c_ptr, c_size_t
    use spurflex_base_error, only: error_type, fatal_error
-   use spurflex_external_posix, only: c_fclose, c_fileno, c_fopen, c_string, errno, failure_reason, make_folder, sync_file
+   use spurflex_base_text, only: to_text
+   use spurflex_external_posix, only: c_fclose, c_fileno, c_fopen, c_fseek, c_string, errno, failure_reason, &
+      from_beginning, make_folder, sync_file
    implicit none
    private
 
@@ -20,10 +22,12 @@ module spurflex_external_file_watch
    integer, parameter :: status_words = 32, number_word = 5, device_word = 18
    !> There is no such file, or no such folder (`ENOENT`, `ENOTDIR`).
    integer(c_int), parameter :: error_no_file = 2_c_int, error_no_folder = 20_c_int
+   !> There is a file of that name (`EEXIST`).
+   integer(c_int), parameter :: error_exists = 17_c_int
+   !> How many names are tried for a copy.
+   integer, parameter :: most_attempts = 100
    !> Bytes copied at once.
    integer, parameter :: buffer_bytes = 1048576
-   !> Count from the beginning of the file (`SEEK_SET`).
-   integer(c_int), parameter :: from_beginning = 0_c_int
 
    !> A file that is watched.
    type :: file_watch
@@ -52,19 +56,6 @@ module spurflex_external_file_watch
          !> 0, or -1 on failure.
          integer(c_int) :: failed
       end function c_statx
-
-      !> Go to a place of a stream.
-      function c_fseek(stream, offset, from) bind(c, name='fseek') result(failed)
-         import :: c_int, c_long, c_ptr
-         !> The stream.
-         type(c_ptr), value :: stream
-         !> Where to.
-         integer(c_long), value :: offset
-         !> From where.
-         integer(c_int), value :: from
-         !> 0, or -1 on failure.
-         integer(c_int) :: failed
-      end function c_fseek
 
       !> Read from a stream.
       function c_fread(buffer, bytes, count, stream) bind(c, name='fread') result(done)
@@ -133,11 +124,13 @@ contains
    end function in_place
 
    !> Copy what the file holds to another path; its folder is made again if that is gone too.
-   subroutine save_contents(watch, path, error)
+   subroutine save_contents(watch, path, saved, error)
       !> The watch.
       type(file_watch), intent(in) :: watch
-      !> Where to; must not exist.
+      !> Where to; a number is added as long as there is a file of that name.
       character(len=*), intent(in) :: path
+      !> Where it went.
+      character(len=:), allocatable, intent(out) :: saved
       !> Set if the contents cannot be saved.
       type(error_type), allocatable, intent(out) :: error
 
@@ -145,14 +138,22 @@ contains
       type(c_ptr) :: copy
       integer(c_size_t) :: bytes
       integer(c_int) :: status
+      integer :: attempt
 
-      copy = c_fopen(c_string(path), c_string('wx'))
+      saved = path
+      do attempt = 1, most_attempts
+         if (attempt > 1) saved = path//'.'//to_text(attempt)
+         copy = c_fopen(c_string(saved), c_string('wx'))
+         if (c_associated(copy)) exit
+         if (errno() == error_no_file) then
+            call make_folder(path(:index(path, '/', back=.true.)))
+            copy = c_fopen(c_string(saved), c_string('wx'))
+            exit
+         end if
+         if (errno() /= error_exists) exit
+      end do
       if (.not. c_associated(copy)) then
-         if (errno() == error_no_file) call make_folder(path(:index(path, '/', back=.true.)))
-         copy = c_fopen(c_string(path), c_string('wx'))
-      end if
-      if (.not. c_associated(copy)) then
-         call fatal_error(error, "cannot make '"//path//"': "//failure_reason(errno()))
+         call fatal_error(error, "cannot make '"//saved//"': "//failure_reason(errno()))
          return
       end if
       allocate (buffer(buffer_bytes))
@@ -164,10 +165,10 @@ contains
       end do
       if (c_fclose(copy) /= 0) status = 1
       if (status /= 0) then
-         call fatal_error(error, "cannot write '"//path//"': "//failure_reason(errno()))
+         call fatal_error(error, "cannot write '"//saved//"': "//failure_reason(errno()))
          return
       end if
-      call sync_file(path, error)
+      call sync_file(saved, error)
    end subroutine save_contents
 
    !> Stop watching.

@@ -1,19 +1,22 @@
 !> The few system calls on files that Fortran lacks, with failures as `error_type`.
 module spurflex_external_posix
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_int, c_int64_t, c_null_char, c_ptr, c_size_t
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_int, c_int64_t, c_long, c_null_char, c_ptr, c_size_t
    use spurflex_base_kinds, only: i8
    use spurflex_base_error, only: error_type, fatal_error
    implicit none
    private
 
-   public :: rename_file, remove_file, sync_file, make_folder, check_writable, check_room
+   public :: rename_file, remove_file, sync_file, make_folder, check_writable, check_room, is_link
    public :: c_string, errno, failure_reason
-   public :: c_fopen, c_fclose, c_fileno
+   public :: c_fopen, c_fclose, c_fileno, c_fseek, from_beginning
 
    !> Read and write for everybody whom the mask of the process allows to.
    integer(c_int), parameter :: everybody = 511_c_int
    !> No room, on the disk or within a quota, or a file larger than is allowed (`ENOSPC`, `EDQUOT`, `EFBIG`).
    integer(c_int), parameter :: errors_of_room(3) = [28_c_int, 122_c_int, 27_c_int]
+
+   !> Count from the beginning of the file (`SEEK_SET`).
+   integer(c_int), parameter :: from_beginning = 0_c_int
 
    interface
       !> Make a folder.
@@ -106,6 +109,32 @@ module spurflex_external_posix
          !> 0, or nonzero on failure.
          integer(c_int) :: status
       end function c_fclose
+
+      !> Go to a place of a stream.
+      function c_fseek(stream, offset, from) bind(c, name='fseek') result(failed)
+         import :: c_int, c_long, c_ptr
+         !> The stream.
+         type(c_ptr), value :: stream
+         !> Where to.
+         integer(c_long), value :: offset
+         !> From where.
+         integer(c_int), value :: from
+         !> 0, or -1 on failure.
+         integer(c_int) :: failed
+      end function c_fseek
+
+      !> Where a link leads.
+      function c_readlink(path, target, length) bind(c, name='readlink') result(bytes)
+         import :: c_char, c_size_t
+         !> Null-terminated path.
+         character(kind=c_char), intent(in) :: path(*)
+         !> What it leads to, not null-terminated.
+         character(kind=c_char), intent(out) :: target(*)
+         !> Room in `target`.
+         integer(c_size_t), value :: length
+         !> Bytes of the target, or -1 (as a signed number) if it is no link.
+         integer(c_size_t) :: bytes
+      end function c_readlink
 
       !> The file descriptor of a stream.
       function c_fileno(stream) bind(c, name='fileno') result(descriptor)
@@ -202,7 +231,19 @@ contains
       if (len(path) > 0) status = c_mkdir(c_string(path), everybody)
    end subroutine make_folder
 
-   !> Whether a file can be opened for writing.
+   !> Whether a path is a link, wherever it leads.
+   function is_link(path)
+      !> The path.
+      character(len=*), intent(in) :: path
+      !> It is.
+      logical :: is_link
+
+      character(kind=c_char) :: target(1)
+
+      is_link = c_readlink(c_string(path), target, 1_c_size_t) >= 0_c_size_t
+   end function is_link
+
+   !> Whether a file can be opened for writing, at any place of it: a pipe cannot.
    subroutine check_writable(path, error)
       !> Path of the file, which exists.
       character(len=*), intent(in) :: path
@@ -214,6 +255,9 @@ contains
 
       stream = c_fopen(c_string(path), c_string('r+'))
       if (c_associated(stream)) then
+         if (c_fseek(stream, 0_c_long, from_beginning) /= 0) then
+            call fatal_error(error, "cannot write to '"//path//"': "//failure_reason(errno()))
+         end if
          status = c_fclose(stream)
       else
          call fatal_error(error, "cannot write to '"//path//"': "//failure_reason(errno()))

@@ -1,19 +1,75 @@
-!> Leaving the process with an exit code that is known only at run time, which Fortran 2008 cannot do.
+!> The process: what the MPI library is told before it starts, and leaving with an exit code that is known only at run time,
+!> which Fortran 2008 cannot do.
 module spurflex_external_process
-   use, intrinsic :: iso_c_binding, only: c_int
+   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char
    implicit none
    private
 
-   public :: exit_process
+   public :: hasten_mpi_start, exit_process
+
+   !> A variable of the environment that is set already stays.
+   integer(c_int), parameter :: keep = 0_c_int
+   !> Longest value that is read.
+   integer, parameter :: value_length = 32
+   !> What tells a rank that it was started as one of several: by mpirun, or by a batch system.
+   character(len=*), parameter :: launchers(4) = [character(len=20) :: 'OMPI_COMM_WORLD_SIZE', 'PMIX_RANK', 'PMIX_NAMESPACE', &
+                                                  'PMI_RANK']
 
    interface
       subroutine c_exit(status) bind(c, name='exit')
          import :: c_int
          integer(c_int), value :: status
       end subroutine c_exit
+
+      !> Set a variable of the environment.
+      function c_setenv(name, value, overwrite) bind(c, name='setenv') result(status)
+         import :: c_char, c_int
+         !> Null-terminated name and value.
+         character(kind=c_char), intent(in) :: name(*), value(*)
+         !> 0: one that is set stays.
+         integer(c_int), value :: overwrite
+         !> 0, or -1 on failure.
+         integer(c_int) :: status
+      end function c_setenv
    end interface
 
 contains
+
+   !> Spare Open MPI the search for networks where all ranks are on one machine: half of its start. What the user has set stays;
+   !> other MPI libraries take no notice.
+   subroutine hasten_mpi_start()
+      character(len=:), allocatable :: ranks, here
+      integer(c_int) :: status
+      logical :: alone
+      integer :: i
+
+      alone = .true.
+      do i = 1, size(launchers)
+         ranks = value_of(trim(launchers(i)))
+         if (ranks /= '') alone = .false.
+      end do
+      ranks = value_of('OMPI_COMM_WORLD_SIZE')
+      here = value_of('OMPI_COMM_WORLD_LOCAL_SIZE')
+      if (.not. alone .and. (ranks == '' .or. here /= ranks)) return
+      ! A failure costs time only. The daemon of a single process stays, though it could be spared too: it gives each process a
+      ! folder of its own for what Open MPI keeps, without which several of them get into each other's way.
+      status = c_setenv('OMPI_MCA_pml'//c_null_char, 'ob1'//c_null_char, keep)
+   end subroutine hasten_mpi_start
+
+   !> Value of a variable of the environment.
+   function value_of(name) result(text)
+      !> Its name.
+      character(len=*), intent(in) :: name
+      !> Its value, or how that begins; empty if it is not set.
+      character(len=:), allocatable :: text
+
+      character(len=value_length) :: value
+      integer :: stat
+
+      call get_environment_variable(name, value, status=stat)
+      text = trim(value)
+      if (stat == 1) text = ''
+   end function value_of
 
    !> End the process; flushes what is open. Does not return.
    subroutine exit_process(code)

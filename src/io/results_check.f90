@@ -8,11 +8,11 @@ module spurflex_io_results_check
    use spurflex_io_hdf5, only: check
    use spurflex_io_hdf5_text, only: read_text
    use spurflex_io_results_check_axes, only: check_axes
-   use spurflex_io_results_create, only: deck_name, provenance_group, version_name
+   use spurflex_io_results_create, only: deck_name, part_ending, provenance_group, version_name
    implicit none
    private
 
-   public :: check_file
+   public :: check_file, check_part
 
    !> What to do about a file that does not fit.
    character(len=*), parameter :: advice = new_line('a')//'Remove the file, or name another one in the deck.'
@@ -66,6 +66,34 @@ contains
          call fatal_error(error, "the result file '"//path//"' is damaged: "//axes_error%message//advice, exit_mismatch)
       end if
    end subroutine check_file
+
+   !> What has the name under which a result file is made may be what a killed run left of one, and nothing else: how HDF5 files
+   !> begin, zeros where the beginning was not yet written, or nothing at all.
+   subroutine check_part(path, error)
+      !> Path of the result file.
+      character(len=*), intent(in) :: path
+      !> Set with `exit_mismatch` if it is something else.
+      type(error_type), allocatable, intent(out) :: error
+
+      character(len=*), parameter :: signature = char(137)//'HDF'
+      character(len=len(signature)) :: begin
+      integer :: unit, stat, bytes
+      logical :: exists
+
+      inquire (file=path//part_ending, exist=exists)
+      if (.not. exists) return
+      open (newunit=unit, file=path//part_ending, action='read', status='old', access='stream', iostat=stat)
+      ! What cannot be read cannot be written either, which is told better then.
+      if (stat /= 0) return
+      inquire (unit=unit, size=bytes)
+      bytes = min(bytes, len(begin))
+      read (unit, iostat=stat) begin(:bytes)
+      close (unit)
+      if (stat /= 0) return
+      if (begin(:bytes) == signature(:bytes) .or. begin(:bytes) == repeat(achar(0), bytes)) return
+      call fatal_error(error, "'"//path//part_ending//"' is needed to make the result file, but is something else; remove it", &
+                       exit_mismatch)
+   end subroutine check_part
 
    !> Read what tells whose a file is.
    subroutine read_identity(file, deck, file_version, error)

@@ -14,9 +14,11 @@ module spurflex_io_results_create
    implicit none
    private
 
-   public :: make_file
-   public :: provenance_group, deck_name, version_name
+   public :: make_part, put_in_place
+   public :: part_ending, provenance_group, deck_name, version_name
 
+   !> Added to the name of the result file: the name under which it is made.
+   character(len=*), parameter :: part_ending = '.part'
    !> Group that says where the file comes from.
    character(len=*), parameter :: provenance_group = 'provenance'
    !> Text in it: the resolved deck.
@@ -30,17 +32,17 @@ module spurflex_io_results_create
 
 contains
 
-   !> Make the file under another name, so that what has the final name is always whole.
-   subroutine make_file(path, case, provenance, replace, error)
+   !> Make the file under another name and bring it to the disk, so that what has the final name is always whole.
+   subroutine make_part(path, case, provenance, replace, error)
       !> Path of the file.
       character(len=*), intent(in) :: path
       !> What is computed.
       type(case_type), intent(in) :: case
       !> What computes it.
       type(provenance_type), intent(in) :: provenance
-      !> Replace a file of that name.
+      !> A file of that name may exist: it is to be replaced.
       logical, intent(in) :: replace
-      !> Set if the file exists or cannot be made.
+      !> Set if the file exists or cannot be made; then nothing is left.
       type(error_type), allocatable, intent(out) :: error
 
       type(error_type), allocatable :: next
@@ -51,12 +53,24 @@ contains
          call fatal_error(error, "the result file '"//path//"' exists already", exit_mismatch)
          return
       end if
-      call create_file(path//'.part', case, provenance, error)
+      call create_file(path//part_ending, case, provenance, error)
       if (allocated(error)) return
-      call sync_file(path//'.part', error)
-      if (.not. allocated(error)) call rename_file(path//'.part', path, error)
-      if (allocated(error)) call remove_file(path//'.part', next)
-   end subroutine make_file
+      call sync_file(path//part_ending, error)
+      if (allocated(error)) call remove_file(path//part_ending, next)
+   end subroutine make_part
+
+   !> Give the file its name, or remove it after an error.
+   subroutine put_in_place(path, error)
+      !> Path of the file.
+      character(len=*), intent(in) :: path
+      !> An error before, or set if it cannot be renamed.
+      type(error_type), allocatable, intent(inout) :: error
+
+      type(error_type), allocatable :: next
+
+      if (.not. allocated(error)) call rename_file(path//part_ending, path, error)
+      if (allocated(error)) call remove_file(path//part_ending, next)
+   end subroutine put_in_place
 
    !> Make the file with every axis, variable and attribute, flush and close it; leave none where that fails.
    subroutine create_file(path, case, provenance, error)

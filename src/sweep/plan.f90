@@ -17,7 +17,7 @@ module spurflex_sweep_plan
    implicit none
    private
 
-   public :: chunk_type, plan_row, plan_grid, is_chained, describe_plan
+   public :: chunk_type, plan_row, plan_grid, points_of, is_chained, describe_plan
 
    !> Points handed out at once at most: few enough to balance, enough to write in one go.
    integer, parameter :: largest_chunk = 256
@@ -82,6 +82,16 @@ contains
 
       chunks = cut_rows(case, status, ranks)
    end function plan_grid
+
+   !> How many points chunks have.
+   pure function points_of(chunks) result(points)
+      !> The chunks.
+      type(chunk_type), intent(in) :: chunks(:)
+      !> Number of points.
+      integer :: points
+
+      points = sum(chunks%rows*chunks%count)
+   end function points_of
 
    !> Cut the missing points of some rows into chunks.
    pure function cut_rows(case, status, ranks) result(chunks)

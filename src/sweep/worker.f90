@@ -23,7 +23,7 @@ module spurflex_sweep_worker
    implicit none
    private
 
-   public :: work_on_chunks, no_twin
+   public :: work_on_chunks, set_points, no_twin
 
    !> Larger than every deformation: a rigid twin that is not known, or not on this rank.
    real(wp), parameter :: no_twin = huge(1.0_wp)

@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import time
+from pathlib import Path
 
 import pytest
 from jobs import (
@@ -71,6 +72,9 @@ def test_limit_too_short_for_the_start(root, run, whole, tmp_path):
         assert done.returncode == EXIT_STOPPED, done.stderr
         counts.append(done_count(tmp_path / "map.h5"))
         assert counts[-1] > counts[-2]
+        # Those of both supports are left, even if the run ends among the rigid ones.
+        left = int(re.search(r"with (\d+) points left", done.stdout)[1])
+        assert left == (ROWS + 1) * 571 - counts[-1]
     assert_done_points_are_right(snapshot(tmp_path / "map.h5"), snapshot(whole))
 
 
@@ -215,6 +219,29 @@ def test_batch_job_passes_the_signal_on(root, batch, tmp_path):
     job.send_signal(signal.SIGUSR1)
     job.communicate(timeout=120)
     assert job.returncode == EXIT_STOPPED
+    assert batch.requeued() == "requeue 4711\n"
+
+
+def catches_usr1(number):
+    """Whether a process has a handler of SIGUSR1."""
+    status = (Path("/proc") / str(number) / "status").read_text()
+    return bool(int(re.search(r"SigCgt:\s*(\w+)", status)[1], 16) >> (signal.SIGUSR1 - 1) & 1)
+
+
+@pytest.mark.parametrize("pause", [0.0, 0.3, 0.6])
+def test_batch_job_is_asked_to_stop_before_it_has_begun(root, batch, tmp_path, pause):
+    """The signal is not lost, and no failure, whatever of the job has started."""
+    folder = tmp_path / "job"
+    deck = map_deck(root, folder, rows=91)
+    job = batch(deck, folder)
+    deadline = time.monotonic() + 60
+    while not catches_usr1(job.pid):
+        assert time.monotonic() < deadline
+        time.sleep(0.001)
+    time.sleep(pause)
+    job.send_signal(signal.SIGUSR1)
+    output = job.communicate(timeout=120)[0]
+    assert job.returncode == EXIT_STOPPED, output
     assert batch.requeued() == "requeue 4711\n"
 
 

@@ -234,6 +234,20 @@ def test_file_is_taken_away(root, run, program, mpiexec, whole, tmp_path, fault)
     assert same_values(snapshot(out / "map.h5"), snapshot(whole))
 
 
+def test_saved_file_is_not_overwritten(root, program, mpiexec, tmp_path):
+    """What an earlier run saved stays; this one adds a number."""
+    folder = tmp_path / "run"
+    deck = map_deck(root, folder, rows=ROWS)
+    (folder / "map.h5.saved").write_text("precious")
+    with Job(program, mpiexec, deck, ranks=2, folder=folder) as job:
+        assert job.wait_for_points(folder / "map.h5", 100)
+        (folder / "map.h5").unlink()
+        assert job.wait() == EXIT_INTERNAL, job.output
+    assert "is in 'map.h5.saved.2'" in job.output
+    assert (folder / "map.h5.saved").read_text() == "precious"
+    assert done_count(folder / "map.h5.saved.2") >= 100
+
+
 # Damaged files -----------------------------------------------------------------------------------
 
 
@@ -319,7 +333,108 @@ def test_foreign_lock_is_left_alone(root, run, tmp_path):
     assert not (tmp_path / "map.h5").exists()
 
 
+def test_foreign_file_at_the_name_of_the_new_one_is_left_alone(root, run, tmp_path):
+    deck = map_deck(root, tmp_path, rows=2, speeds=5)
+    part = tmp_path / "map.h5.part"
+    part.write_text("precious")
+    done = run(deck, ranks=2)
+    assert done.returncode == EXIT_MISMATCH
+    assert "'map.h5.part' is needed to make the result file" in done.stderr
+    assert part.read_text() == "precious"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["map.h5.part", "map.nml"]
+    # What a killed run may leave there is replaced: nothing, zeros, or how a file of HDF5 begins.
+    for begin in (b"", bytes(4096), b"\x89HDF\r\n"):
+        (tmp_path / "map.h5").unlink(missing_ok=True)
+        part.write_bytes(begin)
+        done = run(deck)
+        assert done.returncode == EXIT_COMPLETE, done.stderr
+        assert not part.exists()
+
+
+def test_links_are_followed_but_not_replaced(root, run, tmp_path):
+    deck = map_deck(root, tmp_path, rows=2, speeds=5, file="link.h5")
+    (tmp_path / "link.h5").symlink_to("disk/map.h5")
+    (tmp_path / "disk").mkdir()
+    done = run(deck, ranks=2)
+    assert done.returncode == EXIT_MISMATCH
+    assert "'link.h5' is a link" in done.stderr
+    (tmp_path / "link.h5").unlink()
+    assert run(deck).returncode == EXIT_COMPLETE
+    (tmp_path / "link.h5").rename(tmp_path / "disk" / "map.h5")
+    (tmp_path / "link.h5").symlink_to("disk/map.h5")
+    before = (tmp_path / "disk" / "map.h5").read_bytes()
+    done = run(deck, ranks=2)
+    assert done.returncode == EXIT_COMPLETE, done.stderr
+    assert "nothing to do" in done.stdout
+    assert run("--fresh", deck, ranks=2).returncode == EXIT_MISMATCH
+    assert (tmp_path / "link.h5").is_symlink()
+    assert (tmp_path / "disk" / "map.h5").read_bytes() == before
+
+
+def test_pipe_in_place_of_the_result_file(root, run, tmp_path):
+    """Nobody waits for what never comes."""
+    deck = map_deck(root, tmp_path, rows=2, speeds=5)
+    os.mkfifo(tmp_path / "map.h5")
+    done = run(deck, ranks=2, timeout=60)
+    assert done.returncode == EXIT_INTERNAL
+    assert "cannot write to 'map.h5': Illegal seek" in done.stderr
+
+
 # Processes -----------------------------------------------------------------------------------
+
+
+ELSEWHERE = 'if [ "$OMPI_COMM_WORLD_RANK" = {rank} ]; then cd other; fi; exec "$@"'
+
+
+def run_with_a_rank_elsewhere(program, mpiexec, folder, rank, *words, ranks=3):
+    """Run with one rank in the folder `other`, as if it were on a machine with a disk of its own."""
+    command = [*mpiexec, str(ranks), "sh", "-c", ELSEWHERE.format(rank=rank), "sh", str(program)]
+    return subprocess.run(
+        [*command, *map(str, words)],
+        cwd=folder,
+        env={**os.environ, **EPOCH},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize(("ranks", "rank"), [(2, 1), (5, 1), (5, 4)])
+def test_rank_without_the_folder(root, run, program, mpiexec, tmp_path, ranks, rank):
+    """It is told, nobody waits for ever, and a file that should be replaced is still there."""
+    needs_open_mpi(mpiexec)
+    deck = map_deck(root, tmp_path, rows=2, speeds=5)
+    (tmp_path / "other").mkdir()
+    done = run_with_a_rank_elsewhere(program, mpiexec, tmp_path, rank, deck, ranks=ranks)
+    assert done.returncode == EXIT_INTERNAL, done.stdout + done.stderr
+    assert f"No such file or directory on rank {rank}" in done.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["map.nml", "other"]
+    assert run(deck, environment=EPOCH).returncode == EXIT_COMPLETE
+    before = (tmp_path / "map.h5").read_bytes()
+    for options in ([], ["--fresh"]):
+        done = run_with_a_rank_elsewhere(program, mpiexec, tmp_path, rank, *options, deck, ranks=ranks)
+        assert done.returncode == EXIT_INTERNAL, done.stdout + done.stderr
+        assert (tmp_path / "map.h5").read_bytes() == before
+        assert sorted(path.name for path in tmp_path.iterdir()) == ["map.h5", "map.nml", "other"]
+
+
+def test_rank_with_a_file_of_its_own(program, mpiexec, small, tmp_path):
+    """The same deck, the same name, but another file: what it computed would be missing from the first."""
+    needs_open_mpi(mpiexec)
+    deck, good = small
+    (tmp_path / "other").mkdir()
+    shutil.copy(good, tmp_path / "other")
+    shutil.copy(good, tmp_path)
+    with h5py.File(tmp_path / "map.h5", "r+") as file:
+        file["status"][0, :4] = 0
+    before = (tmp_path / "map.h5").read_bytes()
+    done = run_with_a_rank_elsewhere(program, mpiexec, tmp_path, 2, deck)
+    assert done.returncode == EXIT_INTERNAL, done.stdout + done.stderr
+    assert "not all ranks see the same result file 'map.h5'" in done.stderr
+    assert (tmp_path / "map.h5").read_bytes() == before
+    assert (tmp_path / "other" / "map.h5").read_bytes() == good.read_bytes()
+    assert not (tmp_path / "map.h5.lock").exists()
 
 
 def test_two_runs_on_one_file(root, run, program, mpiexec, whole, tmp_path):
@@ -488,5 +603,6 @@ def test_files_during_the_run_are_beside_the_result(root, program, mpiexec, tmp_
             time.sleep(0.01)
         assert job.wait() == EXIT_COMPLETE, job.output
     assert "out/map.h5.lock" in seen
-    allowed = re.compile(r"map\.nml|out/map\.h5(\.lock|\.part|\.\w{6})?")
+    # Open MPI tries for a moment whether files can be locked there.
+    allowed = re.compile(r"map\.nml|out/map\.h5(\.lock|\.part|\.\w{6}|\.locktest\.\d+)?")
     assert all(allowed.fullmatch(name) for name in seen), seen

@@ -8,7 +8,7 @@ import time
 
 import pytest
 import xarray
-from jobs import EPOCH, EXIT_COMPLETE, EXIT_MISMATCH, EXIT_STOPPED, Job, map_deck
+from jobs import EPOCH, EXIT_COMPLETE, EXIT_MISMATCH, EXIT_STOPPED, Job, map_deck, needs_open_mpi
 
 
 @pytest.fixture
@@ -103,6 +103,13 @@ def test_finished_run_is_recognised(run, deck, copy):
     assert done.returncode == EXIT_COMPLETE
     assert "nothing to do" in done.stdout
     assert copy.read_bytes() == before
+
+
+def test_settings_of_the_mpi_library_stay(run, mpiexec, deck, copy):
+    """The program chooses how Open MPI starts only where the user has not."""
+    needs_open_mpi(mpiexec)
+    done = run(deck, folder=copy.parent, environment={"OMPI_MCA_pml": "none_of_this_name"})
+    assert done.returncode not in (EXIT_COMPLETE, EXIT_MISMATCH, EXIT_STOPPED)
 
 
 def test_fresh_starts_over(run, deck, copy):

@@ -405,7 +405,7 @@ def test_existing_file_is_not_replaced(drive, tmp_path):
 
 
 def test_left_over_part_is_replaced(drive, tmp_path):
-    (tmp_path / "map.h5.part").write_bytes(b"half a file")
+    (tmp_path / "map.h5.part").write_bytes(b"\x89HDF\r\n\x1a\nhalf a file")
     drive("write")
     drive("verify")
     assert [path.name for path in tmp_path.iterdir()] == ["map.h5"]
