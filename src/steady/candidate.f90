@@ -110,11 +110,12 @@ contains
          if (distances(periods) <= near_recurrence*scale .and. is_new(periods)) short = periods
       end do
       ! On a torus sections come back near soon, and much nearer only after many periods.
-      if (short > 0 .and. (transient%periods <= always_tried .or. distances(periods) > much_clearer*distances(max(short, 1)))) &
-         periods = short
+      if (short > 0) then
+         if (transient%periods <= always_tried .or. distances(periods) > much_clearer*distances(short)) periods = short
+      end if
       recurrence = distances(periods)
+      if (.not. is_new(periods)) periods = 0
       if (periods > longest_named .and. (recurrence > long_recurrence*scale .or. transient%periods < long_wait)) periods = 0
-      if (periods > 0) periods = merge(periods, 0, is_new(periods))
       if (.not. in_phase(self, transient) .or. transient%periods > trusted) return
       before = self%distance
       self%distance = weighted_norm(weight, transient%state - self%orbit%state)
