@@ -86,7 +86,7 @@ contains
       !> Three lines.
       character(len=:), allocatable :: text
 
-      text = 'points by path: '//to_text(self%points(way_linear))//' linear (contact kept, one monodromy), ' &
+      text = 'points by path: '//to_text(self%points(way_linear))//' linear (contact kept: Fourier series, one monodromy), ' &
              //to_text(self%points(way_shooting))//' shooting, ' &
              //to_text(self%points(way_transient))//' transient (class by the exponent), ' &
              //to_text(self%points(way_alone))//' alone' &
