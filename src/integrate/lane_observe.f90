@@ -25,7 +25,8 @@ module spurflex_integrate_lane_observe
    type :: lane_view
       private
       real(wp), allocatable :: re(:, :, :, :), im(:, :, :, :), force(:, :, :)
-      !> Values, rates and accelerations, shape (lanes, displacements, orders, 0:steps).
+      !> Values, rates and accelerations, shape (lanes, displacements, orders,
+      !> 0:steps + abreast - 1).
       real(wp), allocatable :: seen(:, :, :, :)
    end type lane_view
 

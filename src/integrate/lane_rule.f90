@@ -62,9 +62,9 @@ module spurflex_integrate_lane_rule
 
    !> A recorded period.
    type :: lane_record
-      !> Modes at the ends of the steps, shape (lanes, most_modes, 0:steps).
+      !> Modes at the ends of the steps, shape (lanes, most_modes, 0:steps + abreast - 1).
       real(wp), allocatable :: re(:, :, :), im(:, :, :)
-      !> N there, shape (lanes, 0:steps) [N].
+      !> N there, shape (lanes, 0:steps + abreast - 1) [N].
       real(wp), allocatable :: force(:, :)
    end type lane_record
 

@@ -1,5 +1,5 @@
 !> Points in lanes, with what judges them: periodic motions are measured twice, with more than twice the steps the second time,
-!> and the difference is the error estimate.
+!> and the difference is the error estimate. Those that keep contact are measured by their Fourier series instead.
 module spurflex_measure_lane_solver
    use spurflex_base_attendant, only: attendant
    use spurflex_base_error, only: error_type

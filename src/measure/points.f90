@@ -1,8 +1,9 @@
 !> The measured responses of several operating points: a tile of the grid.
 !>
 !> Points are solved side by side in lanes. The motion is found with a few steps a mesh period; a periodic one is found again
-!> with more than twice as many, and the difference is the error estimate. A point whose estimate misses the tolerance gets
-!> more steps, and goes on alone, by the integrator of high order, where lanes would need too many.
+!> with more than twice as many, and the difference is the error estimate; one that keeps contact is a Fourier series and needs
+!> neither. A point whose estimate misses the tolerance gets more steps, and goes on alone, by the integrator of high order,
+!> where lanes would need too many.
 module spurflex_measure_points
    use spurflex_base_attendant, only: attendant
    use spurflex_base_kinds, only: wp

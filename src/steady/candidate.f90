@@ -15,8 +15,8 @@ module spurflex_steady_candidate
 
    public :: candidate_type
 
-   !> A transient comes nearer if its distance shrinks to this share from look to look, and surely no other motion of the same
-   !> period is nearer, or to this one, and no other motion at all.
+   !> A transient comes nearer if its distance shrinks to this share from look to look; the second share where it seems to repeat
+   !> with another period.
    real(wp), parameter :: nearer = 0.999_wp, much_nearer = 0.9_wp
 
    !> A transient repeats itself more nearly if what its sections differ by has shrunk to this share.
@@ -81,7 +81,7 @@ contains
    end function may_follow
 
    !> Choose the period with which Newton's method may lead to another motion than before. Takes note of where the transient is.
-   pure subroutine choose(self, weight, transient, scale, periods, recurrence)
+   pure subroutine choose(self, weight, transient, scale, most_periods, periods, recurrence)
       !> Candidate.
       class(candidate_type), intent(inout) :: self
       !> Weights of the states, shape (size).
@@ -90,6 +90,8 @@ contains
       type(transient_type), intent(in) :: transient
       !> Size of the motion [m].
       real(wp), intent(in) :: scale
+      !> Mesh periods of transient at most.
+      integer, intent(in) :: most_periods
       !> Mesh periods after which it nearly repeats itself; 0 if no period is worth a try.
       integer, intent(out) :: periods
       !> What its sections then differ by [m].
@@ -114,9 +116,13 @@ contains
          if (transient%periods <= always_tried .or. distances(periods) > much_clearer*distances(short)) periods = short
       end if
       recurrence = distances(periods)
+      if (periods > longest_named .and. (recurrence > long_recurrence*scale &
+                                         .or. transient%periods < min(long_wait, most_periods/2))) then
+         periods = max(short, 1)
+         recurrence = distances(periods)
+      end if
       if (.not. is_new(periods)) periods = 0
-      if (periods > longest_named .and. (recurrence > long_recurrence*scale .or. transient%periods < long_wait)) periods = 0
-      if (.not. in_phase(self, transient) .or. transient%periods > trusted) return
+      if (.not. in_phase(self, transient) .or. waits_long(transient)) return
       before = self%distance
       self%distance = weighted_norm(weight, transient%state - self%orbit%state)
       if (self%is_stable .and. self%distance <= merge(nearer, much_nearer, periods == self%orbit%periods)*before) periods = 0
@@ -133,6 +139,16 @@ contains
 
          it_is = distances(period) <= merge(repeats_more_nearly, nearer, period <= longest_named)*self%missed(period)
       end function is_new
+
+      !> The transient has waited so long that these rules hold no more.
+      pure function waits_long(transient) result(it_does)
+         !> The transient.
+         type(transient_type), intent(in) :: transient
+         !> It does.
+         logical :: it_does
+
+         it_does = transient%periods > min(trusted, most_periods/2)
+      end function waits_long
 
    end subroutine choose
 
@@ -165,7 +181,11 @@ contains
       !> There is one; it is stable.
       logical, intent(in) :: is_periodic, is_stable
 
-      if (.not. is_stable .and. (is_periodic .or. transient%periods > always_tried)) self%missed(tried) = recurrence
+      logical :: led_nowhere
+
+      ! A multiple of the period says nothing of the motions that have that multiple.
+      led_nowhere = merge(orbit%periods == tried, transient%periods > always_tried, is_periodic)
+      if (.not. is_stable .and. led_nowhere) self%missed(tried) = recurrence
       if (.not. is_periodic) return
       self%distance = weighted_norm(weight, transient%state - orbit%state)
       call move_orbit(orbit, self%orbit)

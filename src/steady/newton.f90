@@ -109,7 +109,7 @@ contains
       orbit%state = orbit%state + step
       orbit%last_step = item%length
       found = item%length <= converged_step*scale .or. (item%length <= stagnant_step*scale .and. item%length > 0.25_wp*previous)
-      if (item%iteration > 1 .and. item%length <= min(trusted_step*scale, fast_shrinkage*previous)) then
+      if (previous < huge(1.0_wp) .and. item%length <= min(trusted_step*scale, fast_shrinkage*previous)) then
          found = found .or. item%length*(item%length/previous) <= converged_step*scale
       end if
       if (found .or. item%iteration == most_iterations) return

@@ -28,7 +28,7 @@ contains
 
    !> Move a motion without copying its matrix.
    pure subroutine move_orbit(from, to)
-      !> The motion; without state and monodromy afterwards.
+      !> The motion; none afterwards.
       type(periodic_orbit), intent(inout) :: from
       !> Where to.
       type(periodic_orbit), intent(inout) :: to
@@ -40,6 +40,7 @@ contains
       to%integrated = from%integrated
       call move_alloc(from%state, to%state)
       call move_alloc(from%monodromy, to%monodromy)
+      from%periods = 0
    end subroutine move_orbit
 
    !> The teeth never part on a motion: the map is affine.

@@ -165,12 +165,13 @@ contains
       do i = 1, n
          associate (p => sound(i))
             scale(i) = max(transients(p)%ring%scale(), points%half_backlash, tiny(1.0_wp))
-            call candidates(p)%choose(points%weight(:, p), transients(p), scale(i), periods(i), recurrence(i))
+            call candidates(p)%choose(points%weight(:, p), transients(p), scale(i), options%max_periods, periods(i), &
+                                      recurrence(i))
          end associate
       end do
       known = pack([(i, i=1, n)], [(candidates(sound(i))%may_follow(transients(sound(i))), i=1, n)])
       call keep_confirmed(sound(known))
-      known = pack([(i, i=1, n)], periods > 0 .and. motions(sound)%status == status_missing)
+      known = pack([(i, i=1, n)], periods > 0 .and. motions(sound)%status == status_missing .and. transients(sound)%sound)
       sound = sound(known)
       n = size(known)
       if (n == 0) return

@@ -2,7 +2,7 @@
 module test_candidate
    use spurflex_base_kinds, only: wp, pi
    use spurflex_steady_candidate, only: candidate_type
-   use spurflex_steady_orbit, only: periodic_orbit
+   use spurflex_steady_orbit, only: periodic_orbit, move_orbit
    use spurflex_steady_transient, only: begin_transient, transient_type
    use test_support, only: check, error_type, new_unittest, unittest_type
    implicit none
@@ -11,6 +11,7 @@ module test_candidate
    public :: collect_candidate
 
    real(wp), parameter :: weight(2) = 1.0_wp, scale = 1.0_wp
+   integer, parameter :: most_periods = 4000
    logical, parameter :: in_use(2) = .true.
 
 contains
@@ -23,6 +24,8 @@ contains
       testsuite = [ &
                   new_unittest('a start is tried with one period', test_start), &
                   new_unittest('the shortest period that nearly repeats', test_shortest), &
+                  new_unittest('a multiple of an unstable motion may be one of its own', test_multiple), &
+                  new_unittest('motions of several periods have a phase', test_phase), &
                   new_unittest('what led to an unstable motion is not tried again', test_unstable), &
                   new_unittest('a stable motion that comes nearer is waited for', test_waits), &
                   new_unittest('who leaves a motion behind is looked at again', test_leaves), &
@@ -90,13 +93,13 @@ contains
       integer :: periods
 
       call turn(0, 1.0_wp, 1.0_wp, 3.0_wp, transient)
-      call candidate%choose(weight, transient, scale, periods, recurrence)
+      call candidate%choose(weight, transient, scale, most_periods, periods, recurrence)
       call check(error, periods, 1, 'one period')
       if (allocated(error)) return
       call check(error, .not. candidate%may_follow(transient), 'nothing to follow')
    end subroutine test_start
 
-   !> Sections that turn once in three periods, and a little more, are tried with three although six come nearer.
+   !> Exact repetitions; three periods that nearly repeat although sixty-four do so much more nearly.
    subroutine test_shortest(error)
       !> Why the test failed.
       type(error_type), allocatable, intent(out) :: error
@@ -108,16 +111,66 @@ contains
 
       do n = 1, 8
          call turn(24, 1.0_wp, 1.0_wp, real(n, wp), transient)
-         call candidate%choose(weight, transient, scale, periods, recurrence)
+         call candidate%choose(weight, transient, scale, most_periods, periods, recurrence)
          call check(error, periods, n, 'exact turns')
          if (allocated(error)) return
       end do
-      call turn(24, 1.0_wp, 1.0_wp, 3.01_wp, transient)
-      call candidate%choose(weight, transient, scale, periods, recurrence)
+      call turn(80, 1.0_wp, 1.0_wp, 64.0_wp/21.0_wp, transient)
+      call candidate%choose(weight, transient, scale, most_periods, periods, recurrence)
       call check(error, periods, 3, 'nearly three')
       if (allocated(error)) return
-      call check(error, recurrence, 2.0_wp*abs(sin(pi*3.0_wp/3.01_wp)), 1.0e-12_wp, 'how nearly')
+      call check(error, recurrence, 2.0_wp*abs(sin(pi*63.0_wp/64.0_wp)), 1.0e-12_wp, 'how nearly')
+      if (allocated(error)) return
+      call turn(200, 1.0_wp, 1.0_wp, 64.0_wp/21.0_wp, transient)
+      call candidate%choose(weight, transient, scale, most_periods, periods, recurrence)
+      call check(error, periods, 3, 'also later, as long as so many as sixty-four are too many')
+      if (allocated(error)) return
+      call turn(1000, 1.0_wp, 1.0_wp, 64.0_wp/21.0_wp, transient)
+      call candidate%choose(weight, transient, scale, most_periods, periods, recurrence)
+      call check(error, periods, 64, 'and then sixty-four')
    end subroutine test_shortest
+
+   !> Two periods led to an unstable motion of one: that says nothing of motions of two.
+   subroutine test_multiple(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      type(candidate_type) :: candidate
+      type(transient_type) :: transient
+      type(periodic_orbit) :: orbit
+      real(wp) :: recurrence
+      integer :: periods
+
+      call turn(192, 1.0e-3_wp, 1.001_wp, 2.0_wp, transient)
+      orbit = orbit_at([0.0_wp, 0.0_wp], 1)
+      call candidate%remember(weight, transient, 2, transient%ring%distance(2), orbit, is_periodic=.true., is_stable=.false.)
+      call turn(384, 0.1_wp, 1.001_wp, 2.0_wp, transient)
+      call candidate%choose(weight, transient, scale, most_periods, periods, recurrence)
+      call check(error, periods, 2, 'the motion of two periods')
+   end subroutine test_multiple
+
+   !> A stable motion of three periods is followed only at the phase at which it was met.
+   subroutine test_phase(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      type(candidate_type) :: candidate
+      type(transient_type) :: transient
+      type(periodic_orbit) :: orbit
+      integer :: k
+
+      call turn(12, 1.0_wp, 1.0_wp, 3.0_wp, transient)
+      orbit = orbit_at(transient%state, 3)
+      call candidate%remember(weight, transient, 3, 0.0_wp, orbit, is_periodic=.true., is_stable=.true.)
+      do k = 12, 20
+         call turn(k, 1.0_wp, 1.0_wp, 3.0_wp, transient)
+         call check(error, candidate%may_follow(transient) .eqv. mod(k, 3) == 0, 'phase')
+         if (allocated(error)) return
+      end do
+      call move_orbit(candidate%orbit, orbit)
+      call turn(24, 1.0_wp, 1.0_wp, 3.0_wp, transient)
+      call check(error, .not. candidate%may_follow(transient), 'nothing is left to follow')
+   end subroutine test_phase
 
    !> Newton's method led to an unstable motion: the same period is tried again only from where it repeats more nearly.
    subroutine test_unstable(error)
@@ -131,7 +184,7 @@ contains
       integer :: periods, again
 
       call turn(12, 0.02_wp, 1.01_wp, 50.0_wp, transient)
-      call candidate%choose(weight, transient, scale, periods, recurrence)
+      call candidate%choose(weight, transient, scale, most_periods, periods, recurrence)
       call check(error, periods, 1, 'one period at first')
       if (allocated(error)) return
       orbit = orbit_at([0.0_wp, 0.0_wp], 1)
@@ -139,12 +192,12 @@ contains
       call check(error, .not. candidate%may_follow(transient), 'an unstable motion is not followed')
       if (allocated(error)) return
       call turn(24, 0.0225_wp, 1.01_wp, 50.0_wp, transient)
-      call candidate%choose(weight, transient, scale, again, later)
+      call candidate%choose(weight, transient, scale, most_periods, again, later)
       call check(error, again, 0, 'leaving slowly')
       if (allocated(error)) return
       ! Far away, on a motion of two periods.
       call turn(48, 1.0_wp, 1.0_wp, 2.0_wp, transient)
-      call candidate%choose(weight, transient, scale, again, later)
+      call candidate%choose(weight, transient, scale, most_periods, again, later)
       call check(error, again, 2, 'another motion')
    end subroutine test_unstable
 
@@ -160,7 +213,7 @@ contains
       integer :: periods
 
       call turn(12, 0.5_wp, 0.99_wp, 40.0_wp, transient)
-      call candidate%choose(weight, transient, scale, periods, recurrence)
+      call candidate%choose(weight, transient, scale, most_periods, periods, recurrence)
       orbit = orbit_at([0.0_wp, 0.0_wp], 1)
       call candidate%remember(weight, transient, periods, recurrence, orbit, is_periodic=.true., is_stable=.true.)
       call check(error, candidate%may_follow(transient), 'a stable motion may be followed')
@@ -168,7 +221,7 @@ contains
       call check(error, .not. allocated(orbit%state), 'its state has moved')
       if (allocated(error)) return
       call turn(24, 0.5_wp*0.99_wp**12, 0.99_wp, 40.0_wp, transient)
-      call candidate%choose(weight, transient, scale, periods, recurrence)
+      call candidate%choose(weight, transient, scale, most_periods, periods, recurrence)
       call check(error, periods, 0, 'nothing to try meanwhile')
    end subroutine test_waits
 
@@ -187,9 +240,9 @@ contains
       orbit = orbit_at([3.0_wp, 0.0_wp], 1)
       call candidate%remember(weight, transient, 1, 1.0_wp, orbit, is_periodic=.true., is_stable=.true.)
       call turn(24, 1.0_wp, 1.0_wp, 5.0_wp, transient)
-      call candidate%choose(weight, transient, scale, periods, recurrence)
+      call candidate%choose(weight, transient, scale, most_periods, periods, recurrence)
       call turn(48, 1.0_wp, 1.0_wp, 5.0_wp, transient)
-      call candidate%choose(weight, transient, scale, periods, recurrence)
+      call candidate%choose(weight, transient, scale, most_periods, periods, recurrence)
       call check(error, periods, 5, 'the other motion is tried')
    end subroutine test_leaves
 
@@ -205,16 +258,20 @@ contains
 
       ! Eleven sections on a circle: none of up to eight periods comes near.
       call turn(384, 1.0_wp, 1.0_wp, 11.0_wp/4.0_wp, transient)
-      call candidate%choose(weight, transient, scale, periods, recurrence)
-      call check(error, periods, 0, 'too early')
+      call candidate%choose(weight, transient, scale, most_periods, periods, recurrence)
+      call check(error, periods <= 8, 'too early')
       if (allocated(error)) return
       call turn(1536, 1.0_wp, 1.0_wp, 11.0_wp/4.0_wp, transient)
-      call candidate%choose(weight, transient, scale, periods, recurrence)
+      call candidate%choose(weight, transient, scale, most_periods, periods, recurrence)
       call check(error, periods, 11, 'late')
       if (allocated(error)) return
       call turn(1536, 1.0_wp, 1.0_wp, 11.02_wp/4.0_wp, transient)
-      call candidate%choose(weight, transient, scale, periods, recurrence)
-      call check(error, periods, 0, 'not near enough')
+      call candidate%choose(weight, transient, scale, most_periods, periods, recurrence)
+      call check(error, periods <= 8, 'not near enough')
+      if (allocated(error)) return
+      call turn(384, 1.0_wp, 1.0_wp, 11.0_wp/4.0_wp, transient)
+      call candidate%choose(weight, transient, scale, 500, periods, recurrence)
+      call check(error, periods, 11, 'not too early where there is no later')
    end subroutine test_long
 
 end module test_candidate

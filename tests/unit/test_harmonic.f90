@@ -209,6 +209,8 @@ contains
       call check(error, .not. allocated(failed), 'the modes are found')
       if (allocated(error)) return
       call find_harmonic_motion(modal, equations, motion)
+      call check(error, motion%order > 0, 'the series converges')
+      if (allocated(error)) return
       associate (w => equations%frequency, mesh => gears%mesh, g => equations%direction)
          allocate (dynamic(equations%n, equations%n))
          do k = 1, equations%n
@@ -244,6 +246,8 @@ contains
       call check(error, .not. allocated(failed), 'the modes are found')
       if (allocated(error)) return
       call find_harmonic_motion(modal, equations, motion)
+      call check(error, motion%order > 0, 'the series converges')
+      if (allocated(error)) return
       answer = empty_response()
       call measure_harmonics(sampler, modal, equations, motion, answer)
       call check(error, answer%contact >= contact_lost, 'contact is lost')
