@@ -22,6 +22,10 @@ module spurflex_sweep_plan
    !> Points handed out at once at most: few enough to balance, enough to write in one go.
    integer, parameter :: largest_chunk = 256
 
+   !> Speeds of a chunk for each of its support stiffnesses: the results of a row are written in one piece, so that wide chunks
+   !> write less often than square ones; still wider ones fill the lanes less well.
+   integer, parameter :: aspect = 4
+
    !> Chunks that each rank should get at least, where there are enough points: a dear one takes as long as 20 others. With fewer
    !> and larger ones the dearest take longer than all that a rank has to do, with more and smaller ones a point costs more.
    integer, parameter :: chunks_per_rank = 64
@@ -109,7 +113,7 @@ contains
 
       missing = count(status == status_missing)
       length = max(1, min(smallest_chunk, missing/(ranks*fewest_chunks)), min(largest_chunk, missing/(ranks*chunks_per_rank)))
-      width = max(1, min(nint(sqrt(real(length))), size(status, 1)))
+      width = max(1, min(nint(sqrt(real(aspect*length))), size(status, 1)))
       height = max(1, min(length/width, size(status, 2)))
       width = max(1, min(length/height, size(status, 1)))
       if (is_chained(case)) then

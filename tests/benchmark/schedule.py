@@ -69,11 +69,12 @@ def constants_of_plan(path=PLAN):
 def tile(length, shape):
     """Rows and speeds of a chunk that is meant to have so many points, on a grid (row, speed).
 
-    Mirrors cut_rows in src/sweep/plan.f90 for points that do not continue each other: as square as it can
-    be, wider than high where the grid has few rows, as the one row of the rigid support.
+    Mirrors cut_rows in src/sweep/plan.f90 for points that do not continue each other: `aspect` times as
+    wide as high, wider where the grid has few rows, as the one row of the rigid support.
     """
     rows, speeds = shape
-    width = max(1, min(math.floor(math.sqrt(length) + 0.5), speeds))
+    aspect = int(parameter(PLAN, "aspect"))
+    width = max(1, min(math.floor(math.sqrt(aspect * length) + 0.5), speeds))
     height = max(1, min(length // width, rows))
     return height, max(1, min(length // height, speeds))
 

@@ -104,16 +104,16 @@ def test_a_replay_is_never_below_the_bound():
 
 
 def test_chunks_are_tiles():
-    costs = np.arange(35.0).reshape(5, 7)
-    # Tiles of 2 rows and 4 speeds; what is left at the ends of the grid is cut off.
-    assert tile(8, costs.shape) == (2, 4)
-    assert cut(costs, 8).tolist() == [
-        costs[:2, :4].sum(),
-        costs[:2, 4:].sum(),
-        costs[2:4, :4].sum(),
-        costs[2:4, 4:].sum(),
-        costs[4:, :4].sum(),
-        costs[4:, 4:].sum(),
+    costs = np.arange(55.0).reshape(5, 11)
+    # Tiles of 2 rows and 8 speeds; what is left at the ends of the grid is cut off.
+    assert tile(16, costs.shape) == (2, 8)
+    assert cut(costs, 16).tolist() == [
+        costs[:2, :8].sum(),
+        costs[:2, 8:].sum(),
+        costs[2:4, :8].sum(),
+        costs[2:4, 8:].sum(),
+        costs[4:, :8].sum(),
+        costs[4:, 8:].sum(),
     ]
     assert cut(costs, 1).tolist() == costs.reshape(-1).tolist()
 
@@ -127,11 +127,11 @@ def test_one_row_is_cut_along_the_speeds():
 @pytest.mark.parametrize(
     ("length", "shape", "expected"),
     [
-        (8, (91, 571), (2, 4)),
-        (16, (91, 571), (4, 4)),
-        (30, (91, 571), (6, 5)),
-        (64, (91, 571), (8, 8)),
-        (128, (91, 571), (11, 11)),
+        (8, (91, 571), (1, 8)),
+        (16, (91, 571), (2, 8)),
+        (30, (91, 571), (2, 15)),
+        (64, (91, 571), (4, 16)),
+        (128, (91, 571), (5, 25)),
         (128, (1, 571), (1, 128)),
         (128, (3, 571), (3, 42)),
         (128, (571, 3), (42, 3)),
@@ -158,7 +158,7 @@ def test_the_plan_still_has_the_rule_that_is_mirrored():
     for line in (
         "length=max(1,min(smallest_chunk,missing/(ranks*fewest_chunks)),"
         "min(largest_chunk,missing/(ranks*chunks_per_rank)))",
-        "width=max(1,min(nint(sqrt(real(length))),size(status,1)))",
+        "width=max(1,min(nint(sqrt(real(aspect*length))),size(status,1)))",
         "height=max(1,min(length/width,size(status,2)))",
         "width=max(1,min(length/height,size(status,1)))",
         "dofirst=1,size(status,2),height",
@@ -228,9 +228,9 @@ def test_dearest_first_by_classes():
 
 
 def test_forecast_of_a_grid():
-    order = forecast(8, (5, 7))
+    order = forecast(16, (5, 11))
     assert order.shape == (3, 2)
-    assert order.points.tolist() == [8, 6, 8, 6, 4, 3]
+    assert order.points.tolist() == [16, 6, 16, 6, 8, 3]
 
 
 def test_the_forecast_still_has_the_rule_that_is_mirrored():

@@ -178,7 +178,7 @@ contains
       end do
    end subroutine test_sizes
 
-   !> A grid of which nothing is done is cut into few tiles, nearly square where there are rows enough.
+   !> A grid of which nothing is done is cut into few tiles, wider than high, of several rows where there are points enough.
    subroutine test_tiles(error)
       !> Why the test failed.
       type(error_type), allocatable, intent(out) :: error
@@ -203,7 +203,10 @@ contains
                              //' rows, '//to_text(ranks)//' ranks: '//to_text(size(chunks))//' chunks')
                   if (allocated(error)) return
                   if (min(speeds(i), rows(k)) < tallest_tile) cycle
-                  call check(error, maxval(chunks%rows) > 1 .and. maxval(chunks%count) <= 3*maxval(chunks%rows), 'nearly square')
+                  call check(error, maxval(chunks%count) >= maxval(chunks%rows), 'wider than high')
+                  if (allocated(error)) return
+                  if (maxval(chunks%rows*chunks%count) < 32) cycle
+                  call check(error, maxval(chunks%rows) > 1 .and. maxval(chunks%count) <= 9*maxval(chunks%rows), 'not too wide')
                   if (allocated(error)) return
                end associate
             end do
