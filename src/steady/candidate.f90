@@ -122,7 +122,7 @@ contains
          recurrence = distances(periods)
       end if
       if (.not. is_new(periods)) periods = 0
-      if (.not. in_phase(self, transient) .or. waits_long(transient)) return
+      if (.not. in_phase(self, transient) .or. transient%periods > min(trusted, most_periods/2)) return
       before = self%distance
       self%distance = weighted_norm(weight, transient%state - self%orbit%state)
       if (self%is_stable .and. self%distance <= merge(nearer, much_nearer, periods == self%orbit%periods)*before) periods = 0
@@ -139,16 +139,6 @@ contains
 
          it_is = distances(period) <= merge(repeats_more_nearly, nearer, period <= longest_named)*self%missed(period)
       end function is_new
-
-      !> The transient has waited so long that these rules hold no more.
-      pure function waits_long(transient) result(it_does)
-         !> The transient.
-         type(transient_type), intent(in) :: transient
-         !> It does.
-         logical :: it_does
-
-         it_does = transient%periods > min(trusted, most_periods/2)
-      end function waits_long
 
    end subroutine choose
 
