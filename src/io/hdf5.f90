@@ -4,7 +4,7 @@ module spurflex_io_hdf5
    use h5ds, only: h5dsattach_scale_f, h5dsset_scale_f
    use hdf5, only: H5D_ALLOC_TIME_EARLY_F, H5D_CONTIGUOUS_F, H5D_FILL_TIME_ALLOC_F, H5P_DATASET_CREATE_F, &
       H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, H5T_NATIVE_INTEGER, H5T_STD_I32LE, h5dcreate_f, h5eset_auto_f, h5open_f, &
-      h5pclose_f, h5pcreate_f, h5pset_alloc_time_f, h5pset_fill_time_f, h5pset_fill_value_f, h5pset_layout_f, &
+      h5pclose_f, h5pcreate_f, h5pset_alloc_time_f, h5pset_chunk_f, h5pset_fill_time_f, h5pset_fill_value_f, h5pset_layout_f, &
       h5pset_obj_track_times_f, h5sclose_f, h5screate_simple_f, hid_t, hsize_t
    use spurflex_base_error, only: error_type, fatal_error
    use spurflex_measure_response, only: nan
@@ -45,7 +45,7 @@ contains
    end subroutine check
 
    !> Make a dataset whose whole extent is on the disk at once: reals filled with NaN, integers with 0.
-   subroutine create_dataset(parent, name, extents, real_values, dataset, error)
+   subroutine create_dataset(parent, name, extents, real_values, dataset, error, width)
       !> File or group.
       integer(hid_t), intent(in) :: parent
       !> Name of the dataset.
@@ -58,12 +58,21 @@ contains
       integer(hid_t), intent(out) :: dataset
       !> Set if it cannot be made.
       type(error_type), allocatable, intent(out) :: error
+      !> Stored in columns of so many elements of the first dimension and all of the others; in one piece if absent or as wide as
+      !> the dataset.
+      integer, intent(in), optional :: width
 
       integer(hid_t) :: properties, space, file_type
-      integer :: ierr(8)
+      integer :: column, ierr(8)
 
       call h5pcreate_f(H5P_DATASET_CREATE_F, properties, ierr(1))
-      call h5pset_layout_f(properties, H5D_CONTIGUOUS_F, ierr(2))
+      column = extents(1)
+      if (present(width)) column = width
+      if (column < extents(1)) then
+         call h5pset_chunk_f(properties, size(extents), int([column, extents(2:)], hsize_t), ierr(2))
+      else
+         call h5pset_layout_f(properties, H5D_CONTIGUOUS_F, ierr(2))
+      end if
       call h5pset_alloc_time_f(properties, H5D_ALLOC_TIME_EARLY_F, ierr(3))
       call h5pset_fill_time_f(properties, H5D_FILL_TIME_ALLOC_F, ierr(4))
       call h5pset_obj_track_times_f(properties, .false., ierr(5))

@@ -1,4 +1,8 @@
-!> Runs of values into and out of open HDF5 datasets, each rank for itself.
+!> Blocks of values into and out of open HDF5 datasets, each rank for itself.
+!>
+!> A dataset may be stored in columns: the whole block of some neighbouring elements of the first dimension, column after
+!> column. What lies in one column is moved in one piece if it has the width of the column; so a block is cut into those of each
+!> column. Of other datasets it is a block too, only slower.
 module spurflex_io_hdf5_run
    use hdf5, only: H5S_SELECT_SET_F, H5T_NATIVE_DOUBLE, H5T_NATIVE_INTEGER, h5dread_f, h5dwrite_f, h5sclose_f, &
       h5screate_simple_f, h5sselect_hyperslab_f, hid_t, hsize_t
@@ -10,15 +14,23 @@ module spurflex_io_hdf5_run
 
    public :: run_type, select_run, end_run, write_run, read_run
 
-   !> A contiguous run of elements, for every dataset of one shape.
+   !> What of a run is moved at once.
+   type :: piece_type
+      !> First element from 0 and extents, fastest index first, shape (dimensions).
+      integer(hsize_t), allocatable :: first(:), extents(:)
+      !> Space of the values in memory. It has the extents of the piece: the library compares other shapes element by element.
+      integer(hid_t) :: memory_space = -1_hid_t
+      !> Where its values are among those of the run, shape (elements).
+      integer, allocatable :: places(:)
+   end type piece_type
+
+   !> A block of elements, for every dataset of one shape.
    type :: run_type
       private
-      !> Space of the file, shared with the owner, with the run selected.
+      !> Space of the file, shared with the owner, with a piece selected.
       integer(hid_t) :: file_space
-      !> Space of the values in memory.
-      integer(hid_t) :: memory_space
-      !> How many elements.
-      integer(hsize_t) :: extents(1)
+      !> The pieces, side by side along the first dimension.
+      type(piece_type), allocatable :: pieces(:)
    end type run_type
 
    !> Write the values of a run, reals or integers.
@@ -36,7 +48,7 @@ module spurflex_io_hdf5_run
 contains
 
    !> Select a run.
-   subroutine select_run(run, space, first, count, error)
+   subroutine select_run(run, space, first, count, width, error)
       !> The run, to be ended.
       type(run_type), intent(out) :: run
       !> Space of the datasets; its selection changes.
@@ -45,17 +57,49 @@ contains
       integer, intent(in) :: first(:)
       !> How many elements along each dimension, shape (dimensions).
       integer, intent(in) :: count(:)
+      !> Width of the columns in which the datasets are stored.
+      integer, intent(in) :: width
       !> Set if there is no such run.
       type(error_type), allocatable, intent(out) :: error
 
-      integer :: ierr(2)
+      integer :: i, begin, end, row, j, ierr
 
       run%file_space = space
-      run%extents = product(int(count, hsize_t))
-      call h5sselect_hyperslab_f(space, H5S_SELECT_SET_F, int(first - 1, hsize_t), int(count, hsize_t), ierr(1))
-      call h5screate_simple_f(1, run%extents, run%memory_space, ierr(2))
-      call check(minval(ierr), 'select a run of points', error)
+      associate (before => (first(1) - 1)/width)
+         allocate (run%pieces((first(1) + count(1) - 2)/width - before + 1))
+         do i = 1, size(run%pieces)
+            associate (piece => run%pieces(i))
+               ! Of the first dimension, as counted in the run.
+               begin = max(1, (before + i - 1)*width - first(1) + 2)
+               end = count(1)
+               if (i < size(run%pieces)) end = (before + i)*width - first(1) + 1
+               piece%first = int(first - 1, hsize_t)
+               piece%first(1) = piece%first(1) + begin - 1
+               piece%extents = int(count, hsize_t)
+               piece%extents(1) = end - begin + 1
+               if (size(run%pieces) > 1) piece%places = [(((row - 1)*count(1) + j, j=begin, end), row=1, product(count(2:)))]
+               call h5screate_simple_f(size(count), piece%extents, piece%memory_space, ierr)
+               call check(ierr, 'select a run of points', error)
+            end associate
+         end do
+      end associate
+      if (.not. allocated(error)) call select_piece(run, run%pieces(1), error)
    end subroutine select_run
+
+   !> Select a piece of a run.
+   subroutine select_piece(run, piece, error)
+      !> The run.
+      type(run_type), intent(in) :: run
+      !> The piece.
+      type(piece_type), intent(in) :: piece
+      !> Set if there is no such piece.
+      type(error_type), allocatable, intent(inout) :: error
+
+      integer :: ierr
+
+      call h5sselect_hyperslab_f(run%file_space, H5S_SELECT_SET_F, piece%first, piece%extents, ierr)
+      call check(ierr, 'select a run of points', error)
+   end subroutine select_piece
 
    !> End a run.
    subroutine end_run(run, error)
@@ -64,10 +108,12 @@ contains
       !> Set if it cannot be ended.
       type(error_type), allocatable, intent(out) :: error
 
-      integer :: ierr
+      integer :: i, ierr
 
-      call h5sclose_f(run%memory_space, ierr)
-      call check(ierr, 'end a run of points', error)
+      do i = 1, size(run%pieces)
+         call h5sclose_f(run%pieces(i)%memory_space, ierr)
+         call check(ierr, 'end a run of points', error)
+      end do
    end subroutine end_run
 
    !> Write reals.
@@ -81,10 +127,22 @@ contains
       !> Set if they cannot be written.
       type(error_type), allocatable, intent(out) :: error
 
-      integer :: ierr
+      real(wp), allocatable :: mine(:)
+      integer :: i, ierr
 
-      call h5dwrite_f(dataset, H5T_NATIVE_DOUBLE, values, run%extents, ierr, run%memory_space, run%file_space)
-      call check(ierr, 'write the results', error)
+      do i = 1, size(run%pieces)
+         associate (piece => run%pieces(i))
+            if (size(run%pieces) == 1) then
+               call h5dwrite_f(dataset, H5T_NATIVE_DOUBLE, values, piece%extents, ierr, piece%memory_space, run%file_space)
+            else
+               call select_piece(run, piece, error)
+               mine = values(piece%places)
+               call h5dwrite_f(dataset, H5T_NATIVE_DOUBLE, mine, piece%extents, ierr, piece%memory_space, run%file_space)
+            end if
+            call check(ierr, 'write the results', error)
+         end associate
+         if (allocated(error)) return
+      end do
    end subroutine write_reals
 
    !> Write integers.
@@ -98,10 +156,22 @@ contains
       !> Set if they cannot be written.
       type(error_type), allocatable, intent(out) :: error
 
-      integer :: ierr
+      integer, allocatable :: mine(:)
+      integer :: i, ierr
 
-      call h5dwrite_f(dataset, H5T_NATIVE_INTEGER, values, run%extents, ierr, run%memory_space, run%file_space)
-      call check(ierr, 'write the results', error)
+      do i = 1, size(run%pieces)
+         associate (piece => run%pieces(i))
+            if (size(run%pieces) == 1) then
+               call h5dwrite_f(dataset, H5T_NATIVE_INTEGER, values, piece%extents, ierr, piece%memory_space, run%file_space)
+            else
+               call select_piece(run, piece, error)
+               mine = values(piece%places)
+               call h5dwrite_f(dataset, H5T_NATIVE_INTEGER, mine, piece%extents, ierr, piece%memory_space, run%file_space)
+            end if
+            call check(ierr, 'write the results', error)
+         end associate
+         if (allocated(error)) return
+      end do
    end subroutine write_integers
 
    !> Read reals.
@@ -115,10 +185,23 @@ contains
       !> Set if they cannot be read.
       type(error_type), allocatable, intent(out) :: error
 
-      integer :: ierr
+      real(wp), allocatable :: mine(:)
+      integer :: i, ierr
 
-      call h5dread_f(dataset, H5T_NATIVE_DOUBLE, values, run%extents, ierr, run%memory_space, run%file_space)
-      call check(ierr, 'read the results', error)
+      do i = 1, size(run%pieces)
+         associate (piece => run%pieces(i))
+            if (size(run%pieces) == 1) then
+               call h5dread_f(dataset, H5T_NATIVE_DOUBLE, values, piece%extents, ierr, piece%memory_space, run%file_space)
+            else
+               call select_piece(run, piece, error)
+               mine = values(piece%places)
+               call h5dread_f(dataset, H5T_NATIVE_DOUBLE, mine, piece%extents, ierr, piece%memory_space, run%file_space)
+               values(piece%places) = mine
+            end if
+            call check(ierr, 'read the results', error)
+         end associate
+         if (allocated(error)) return
+      end do
    end subroutine read_reals
 
    !> Read integers.
@@ -132,10 +215,23 @@ contains
       !> Set if they cannot be read.
       type(error_type), allocatable, intent(out) :: error
 
-      integer :: ierr
+      integer, allocatable :: mine(:)
+      integer :: i, ierr
 
-      call h5dread_f(dataset, H5T_NATIVE_INTEGER, values, run%extents, ierr, run%memory_space, run%file_space)
-      call check(ierr, 'read the results', error)
+      do i = 1, size(run%pieces)
+         associate (piece => run%pieces(i))
+            if (size(run%pieces) == 1) then
+               call h5dread_f(dataset, H5T_NATIVE_INTEGER, values, piece%extents, ierr, piece%memory_space, run%file_space)
+            else
+               call select_piece(run, piece, error)
+               mine = values(piece%places)
+               call h5dread_f(dataset, H5T_NATIVE_INTEGER, mine, piece%extents, ierr, piece%memory_space, run%file_space)
+               values(piece%places) = mine
+            end if
+            call check(ierr, 'read the results', error)
+         end associate
+         if (allocated(error)) return
+      end do
    end subroutine read_integers
 
 end module spurflex_io_hdf5_run

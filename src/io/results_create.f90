@@ -10,7 +10,8 @@ module spurflex_io_results_create
    use spurflex_io_hdf5_text, only: write_attribute, write_text
    use spurflex_io_provenance, only: provenance_type
    use spurflex_io_record_layout, only: file_axes, file_variables, history_group, record_spectrum, window_text
-   use spurflex_io_results_layout, only: axis_type, flags_of, real_value, speed_axis, stiffness_axis, variable_type
+   use spurflex_io_results_layout, only: axis_type, flags_of, real_value, speed_axis, stiffness_axis, variable_type, &
+      width_of
    implicit none
    private
 
@@ -280,7 +281,8 @@ contains
          chosen(i) = position_of(variable%axes(i), axes)
          extents(i) = size(axes(chosen(i))%values)
       end do
-      call create_dataset(file, trim(variable%name), extents, variable%kind == real_value, dataset, error)
+      call create_dataset(file, trim(variable%name), extents, variable%kind == real_value, dataset, error, &
+                          width_of(variable, extents(1)))
       if (allocated(error)) return
       do i = 1, size(chosen)
          call attach_scale(dataset, scales(chosen(i)), i, size(chosen), error)

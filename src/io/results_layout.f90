@@ -22,6 +22,7 @@ module spurflex_io_results_layout
    public :: axes_of, flags_of, rigid_variables, flexible_variables, get_values, set_values
    public :: real_value, reason_flag, checksum_quantity, name_length, units_length, long_name_length
    public :: most_dimensions, speed_axis, stiffness_axis, rigid_prefix, rigid_description
+   public :: width_of
 
    !> Longest name of a variable.
    integer, parameter :: name_length = 48
@@ -33,6 +34,10 @@ module spurflex_io_results_layout
    integer, parameter :: product_length = 16
    !> Most dimensions of a variable.
    integer, parameter :: most_dimensions = 3
+
+   !> Speeds of a column. What stands on the grid is stored in columns of so many speeds and every support stiffness: what is
+   !> found out about neighbouring points, as wide as a column, is one piece of the file then, not one for each stiffness.
+   integer, parameter :: column_speeds = 32
 
    !> What a variable holds: reals, plain integers, or one of the sets of flags.
    integer, parameter :: real_value = 0, plain_integer = 1, motion_flag = 2, status_flag = 3, contact_flag = 4, &
@@ -221,6 +226,20 @@ contains
          variables(i)%axes = axes
       end do
    end function variables_of
+
+   !> How many elements of its first dimension a variable has side by side in the file: the speeds of a column where it has one
+   !> number for each point of the grid, else all.
+   pure function width_of(variable, extent) result(width)
+      !> The variable.
+      type(variable_type), intent(in) :: variable
+      !> Its extent along the first dimension.
+      integer, intent(in) :: extent
+      !> The width; it is stored in columns where that is less than the extent.
+      integer :: width
+
+      width = extent
+      if (all(variable%axes == [character(len=name_length) :: speed_axis, stiffness_axis, ''])) width = min(extent, column_speeds)
+   end function width_of
 
    !> The flags of an integer variable, as CF has them.
    pure subroutine flags_of(kind, values, meanings)

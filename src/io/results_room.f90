@@ -8,7 +8,7 @@ module spurflex_io_results_room
    use spurflex_external_posix, only: check_room
    use spurflex_io_case, only: case_type
    use spurflex_io_record_layout, only: file_axes, file_variables
-   use spurflex_io_results_layout, only: axis_type, real_value, variable_type
+   use spurflex_io_results_layout, only: axis_type, real_value, variable_type, width_of
    implicit none
    private
 
@@ -52,7 +52,7 @@ contains
       folder = path(:index(path, '/', back=.true.))//'.'
    end function folder_of
 
-   !> Bytes of all variables.
+   !> Bytes of all variables: what is stored in columns takes whole ones.
    pure function array_bytes(case) result(bytes)
       !> Case.
       type(case_type), intent(in) :: case
@@ -62,7 +62,7 @@ contains
       type(axis_type), allocatable :: axes(:)
       type(variable_type), allocatable :: variables(:)
       integer(i8) :: elements
-      integer :: i, j
+      integer :: i, j, extent, width
 
       allocate (axes, source=file_axes(case))
       allocate (variables, source=file_variables(case))
@@ -70,7 +70,13 @@ contains
       do i = 1, size(variables)
          elements = 1_i8
          do j = 1, size(axes)
-            if (any(variables(i)%axes == axes(j)%name)) elements = elements*size(axes(j)%values, kind=i8)
+            if (all(variables(i)%axes /= axes(j)%name)) cycle
+            extent = size(axes(j)%values)
+            if (variables(i)%axes(1) == axes(j)%name) then
+               width = width_of(variables(i), extent)
+               extent = ((extent - 1)/width + 1)*width
+            end if
+            elements = elements*extent
          end do
          bytes = bytes + elements*merge(real_bytes, integer_bytes, variables(i)%kind == real_value)
       end do

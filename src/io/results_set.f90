@@ -7,7 +7,7 @@ module spurflex_io_results_set
    use spurflex_base_kinds, only: i4, wp
    use spurflex_io_hdf5, only: check
    use spurflex_io_hdf5_run, only: end_run, read_run, run_type, select_run, write_run
-   use spurflex_io_results_layout, only: checksum_quantity, get_values, real_value, set_values, variable_type
+   use spurflex_io_results_layout, only: checksum_quantity, get_values, real_value, set_values, variable_type, width_of
    use spurflex_measure_response, only: nan, response, status_missing
    implicit none
    private
@@ -24,6 +24,8 @@ module spurflex_io_results_set
       integer(hid_t) :: space = -1_hid_t
       !> Their extents, fastest first, shape (dimensions).
       integer, allocatable :: extents(:)
+      !> How many elements of the first dimension they have side by side in the file; only valid where there are variables.
+      integer :: width = 0
    end type variable_set
 
 contains
@@ -47,6 +49,7 @@ contains
 
       set%variables = variables
       set%extents = extents
+      if (size(variables) > 0) set%width = width_of(variables(1), extents(1))
       allocate (set%datasets(0))
       do i = 1, size(variables)
          call h5dopen_f(file, trim(variables(i)%name), space, ierr(1))
@@ -115,7 +118,7 @@ contains
       integer :: integers(size(responses)), i
 
       if (size(responses) == 0) return
-      call select_run(run, set%space, first, extent, error)
+      call select_run(run, set%space, first, extent, set%width, error)
       if (allocated(error)) return
       reals = nan()
       integers = 0
@@ -161,7 +164,7 @@ contains
       real(wp) :: reals(size(responses))
       integer :: integers(size(responses)), i
 
-      call select_run(run, set%space, [1], set%extents, error)
+      call select_run(run, set%space, [1], set%extents, set%width, error)
       if (allocated(error)) return
       reals = nan()
       integers = 0
@@ -206,7 +209,7 @@ contains
       type(run_type) :: run
       integer :: i
 
-      call select_run(run, set%space, first, extent, error)
+      call select_run(run, set%space, first, extent, set%width, error)
       if (allocated(error)) return
       do i = 1, size(set%datasets)
          if (set%variables(i)%quantity /= quantity) cycle

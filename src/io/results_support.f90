@@ -120,7 +120,7 @@ contains
          associate (pieces => set%records(kind), length => set%lengths(kind))
             if (size(pieces%datasets) == 0) cycle
             allocate (values(length*size(records)))
-            call select_run(run, pieces%space, [1, first], [length, extent], error)
+            call select_run(run, pieces%space, [1, first], [length, extent], pieces%width, error)
             if (allocated(error)) return
             do v = 1, size(pieces%datasets)
                do i = 1, size(records)

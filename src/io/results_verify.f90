@@ -111,7 +111,7 @@ contains
       allocate (reals(product(extent)))
       length = size(reals)/size(checksums)
       integers = 0
-      call select_run(run, set%space, first, extent, error)
+      call select_run(run, set%space, first, extent, set%width, error)
       do v = 1, size(set%datasets)
          if (allocated(error)) return
          if (set%variables(v)%kind == real_value) then

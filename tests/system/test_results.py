@@ -14,6 +14,8 @@ import pytest
 import xarray
 
 SPEEDS, STIFFNESSES = 5, 3
+COLUMN = 32
+"""Speeds of a column in which a file with more of them stores the variables on the grid."""
 TITLE = "Prüfung"
 DECK_ERROR, MISMATCH = 2, 3
 REALS = {
@@ -195,15 +197,59 @@ def test_provenance(drive, tmp_path):
     assert drive("create", environment={"SOURCE_DATE_EPOCH": "now"}, code=DECK_ERROR).stderr
 
 
-def test_layout_survives_a_kill(drive, tmp_path):
-    """Contiguous, and all of it on the disk from the start."""
-    drive("create")
+@pytest.mark.parametrize("speeds", [COLUMN, COLUMN + 1, 2 * COLUMN])
+def test_layout_survives_a_kill(drive, tmp_path, speeds):
+    """In one piece or in columns, unpacked, and all of it on the disk from the start."""
+    drive("create", speeds=speeds)
     with h5py.File(tmp_path / "map.h5") as file:
         for dataset in file.values():
             if isinstance(dataset, h5py.Dataset):
-                assert dataset.chunks is None
-                assert dataset.id.get_create_plist().get_alloc_time() == h5py.h5d.ALLOC_TIME_EARLY
+                in_columns = dataset.ndim == 2 and speeds > COLUMN
+                assert dataset.chunks == ((STIFFNESSES, COLUMN) if in_columns else None)
+                properties = dataset.id.get_create_plist()
+                assert properties.get_nfilters() == 0
+                assert properties.get_alloc_time() == h5py.h5d.ALLOC_TIME_EARLY
                 assert dataset.id.get_space_status() == h5py.h5d.SPACE_STATUS_ALLOCATED
+
+
+def stored_in_one_piece(path):
+    """A copy of a result file whose variables are all contiguous takes its place."""
+    other = path.with_suffix(".other")
+    with h5py.File(path) as file, h5py.File(other, "w") as copy:
+        copy.attrs.update(file.attrs)
+        file.copy("provenance", copy)
+        for name, dataset in file.items():
+            if isinstance(dataset, h5py.Dataset):
+                copy[name] = dataset[()]
+    other.replace(path)
+
+
+def test_file_without_columns_is_continued(drive, tmp_path):
+    """How the numbers are stored is up to the file."""
+    size = {"speeds": 70, "stiffnesses": 7}
+    assert drive("die", ranks=2, code=None, **size).returncode != 0
+    stored_in_one_piece(tmp_path / "map.h5")
+    drive("resume", ranks=2, **size)
+    drive("verify", ranks=2, **size)
+    with h5py.File(tmp_path / "map.h5") as file:
+        assert file["status"].chunks is None
+
+
+def test_flipped_byte_in_a_column_is_found(drive, tmp_path):
+    """Wherever it is: each point of a file in columns has its checksum compared."""
+    size = {"speeds": 70, "stiffnesses": 7}
+    drive("write", **size)
+    good = (tmp_path / "map.h5").read_bytes()
+    with h5py.File(tmp_path / "map.h5") as file:
+        data = file["y1_rms"]
+        stored = [data.id.get_chunk_info(i) for i in range(data.id.get_num_chunks())]
+    assert [chunk.size for chunk in stored] == [7 * COLUMN * 8] * 3
+    for chunk, column, row in zip(stored, (0, COLUMN - 1, 5), (0, 3, 6), strict=True):
+        bad = bytearray(good)
+        bad[chunk.byte_offset + 8 * (row * COLUMN + column)] ^= 1
+        (tmp_path / "map.h5").write_bytes(bad)
+        assert "flexible: 1 point was damaged" in drive("resume", ranks=2, **size).stdout
+        assert (tmp_path / "map.h5").read_bytes() == good
 
 
 def test_same_bytes_at_any_number_of_ranks(drive, tmp_path):
