@@ -22,8 +22,8 @@ module spurflex_sweep_plan
    !> Points handed out at once at most: few enough to balance, enough to write in one go.
    integer, parameter :: largest_chunk = 256
 
-   !> Speeds of a chunk for each of its support stiffnesses: the results of a row are written in one piece, so that wide chunks
-   !> write less often than square ones; still wider ones fill the lanes less well.
+   !> Speeds of a chunk for each of its support stiffnesses, to a factor of two: a chunk as wide as a column of the result file is
+   !> written in one piece a variable, a narrower one row by row; still wider ones fill the lanes less well.
    integer, parameter :: aspect = 4
 
    !> Chunks that each rank should get at least, where there are enough points: a dear one takes as long as 20 others. With fewer
@@ -113,9 +113,14 @@ contains
 
       missing = count(status == status_missing)
       length = max(1, min(smallest_chunk, missing/(ranks*fewest_chunks)), min(largest_chunk, missing/(ranks*chunks_per_rank)))
-      width = max(1, min(nint(sqrt(real(aspect*length))), size(status, 1)))
+      ! A power of two: a tile begins with a column of the result file, or several fill it.
+      width = 1
+      do while (2*width**2 <= aspect*length .and. 2*width <= length .and. width < size(status, 1))
+         width = 2*width
+      end do
+      width = max(1, min(width, size(status, 1)))
       height = max(1, min(length/width, size(status, 2)))
-      width = max(1, min(length/height, size(status, 1)))
+      if (height == size(status, 2)) width = max(1, min(length/height, size(status, 1)))
       if (is_chained(case)) then
          height = max(1, min(smallest_chunk, size(status, 2)/ranks))
          width = max(1, size(status, 1))

@@ -5,7 +5,6 @@ out) and src/sweep/schedule.f90 (how).
 """
 
 import heapq
-import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -69,14 +68,18 @@ def constants_of_plan(path=PLAN):
 def tile(length, shape):
     """Rows and speeds of a chunk that is meant to have so many points, on a grid (row, speed).
 
-    Mirrors cut_rows in src/sweep/plan.f90 for points that do not continue each other: `aspect` times as
-    wide as high, wider where the grid has few rows, as the one row of the rigid support.
+    Mirrors cut_rows in src/sweep/plan.f90 for points that do not continue each other: some `aspect` times
+    as wide as high and a power of two, wider where the grid has few rows, as the one row of the rigid
+    support.
     """
     rows, speeds = shape
     aspect = int(parameter(PLAN, "aspect"))
-    width = max(1, min(math.floor(math.sqrt(aspect * length) + 0.5), speeds))
+    width = 1
+    while 2 * width**2 <= aspect * length and 2 * width <= length and width < speeds:
+        width *= 2
+    width = min(width, speeds)
     height = max(1, min(length // width, rows))
-    return height, max(1, min(length // height, speeds))
+    return height, max(1, min(length // height, speeds)) if height == rows else width
 
 
 def cut(costs, length):

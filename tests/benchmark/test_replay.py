@@ -129,9 +129,9 @@ def test_one_row_is_cut_along_the_speeds():
     [
         (8, (91, 571), (1, 8)),
         (16, (91, 571), (2, 8)),
-        (30, (91, 571), (2, 15)),
+        (30, (91, 571), (3, 8)),
         (64, (91, 571), (4, 16)),
-        (128, (91, 571), (5, 25)),
+        (128, (91, 571), (4, 32)),
         (128, (1, 571), (1, 128)),
         (128, (3, 571), (3, 42)),
         (128, (571, 3), (42, 3)),
@@ -158,9 +158,10 @@ def test_the_plan_still_has_the_rule_that_is_mirrored():
     for line in (
         "length=max(1,min(smallest_chunk,missing/(ranks*fewest_chunks)),"
         "min(largest_chunk,missing/(ranks*chunks_per_rank)))",
-        "width=max(1,min(nint(sqrt(real(aspect*length))),size(status,1)))",
+        "dowhile(2*width**2<=aspect*length.and.2*width<=length.and.width<size(status,1))width=2*width",
+        "width=max(1,min(width,size(status,1)))",
         "height=max(1,min(length/width,size(status,2)))",
-        "width=max(1,min(length/height,size(status,1)))",
+        "if(height==size(status,2))width=max(1,min(length/height,size(status,1)))",
         "dofirst=1,size(status,2),height",
         "dospeed=1,size(status,1),width",
     ):
