@@ -1,11 +1,12 @@
-!> The process: what the MPI library is told before it starts, and leaving with an exit code that is known only at run time,
-!> which Fortran 2008 cannot do.
+!> The process: what the MPI library is told before it starts, sleeping, and leaving with an exit code that is known only at run
+!> time, which Fortran 2008 cannot do.
 module spurflex_external_process
-   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char
+   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_long, c_null_char, c_null_ptr, c_ptr
+   use spurflex_base_kinds, only: wp
    implicit none
    private
 
-   public :: hasten_mpi_start, exit_process
+   public :: hasten_mpi_start, sleep, exit_process
 
    !> A variable of the environment that is set already stays.
    integer(c_int), parameter :: keep = 0_c_int
@@ -20,6 +21,17 @@ module spurflex_external_process
          import :: c_int
          integer(c_int), value :: status
       end subroutine c_exit
+
+      !> Sleep.
+      function c_nanosleep(time, left) bind(c, name='nanosleep') result(status)
+         import :: c_int, c_long, c_ptr
+         !> Seconds and nanoseconds: `struct timespec`.
+         integer(c_long), intent(in) :: time(2)
+         !> Where what is left after a signal is to be told; may be null.
+         type(c_ptr), value :: left
+         !> 0, or -1 if it ended early.
+         integer(c_int) :: status
+      end function c_nanosleep
 
       !> Set a variable of the environment.
       function c_setenv(name, value, overwrite) bind(c, name='setenv') result(status)
@@ -70,6 +82,16 @@ contains
       text = trim(value)
       if (stat == 1) text = ''
    end function value_of
+
+   !> Leave the processor to others for a while; a signal may cut it short.
+   subroutine sleep(seconds)
+      !> How long [s].
+      real(wp), intent(in) :: seconds
+
+      integer(c_int) :: status
+
+      status = c_nanosleep([int(seconds, c_long), int(1.0e9_wp*(seconds - aint(seconds)), c_long)], c_null_ptr)
+   end subroutine sleep
 
    !> End the process; flushes what is open. Does not return.
    subroutine exit_process(code)

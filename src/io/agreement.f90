@@ -1,13 +1,36 @@
-!> Makes every rank know of an error on any of them.
+!> Makes the ranks wait for each other, and every rank know of an error on any.
 module spurflex_io_agreement
-   use mpi_f08, only: MPI_Comm, MPI_CHARACTER, MPI_INTEGER, MPI_MIN, mpi_allreduce, mpi_bcast, mpi_comm_rank
+   use mpi_f08, only: MPI_Comm, MPI_CHARACTER, MPI_INTEGER, MPI_MIN, MPI_Request, MPI_STATUS_IGNORE, mpi_allreduce, mpi_bcast, &
+      mpi_comm_rank, mpi_ibarrier, mpi_test
    use spurflex_base_error, only: error_type
+   use spurflex_base_kinds, only: wp
+   use spurflex_external_process, only: sleep
    implicit none
    private
 
-   public :: share_error
+   public :: await_all, share_error
+
+   !> Seconds of sleep between two looks whether the others have come.
+   real(wp), parameter :: nap = 0.5e-3_wp
 
 contains
+
+   !> Wait until every rank is here, asleep: where one of them works long and alone, the MPI library would keep the processors of
+   !> the others busy with looking. All ranks call this together.
+   subroutine await_all(comm)
+      !> The ranks.
+      type(MPI_Comm), intent(in) :: comm
+
+      type(MPI_Request) :: request
+      logical :: all_here
+
+      call mpi_ibarrier(comm, request)
+      do
+         call mpi_test(request, all_here, MPI_STATUS_IGNORE)
+         if (all_here) exit
+         call sleep(nap)
+      end do
+   end subroutine await_all
 
    !> After this, either no rank has an error or all have that of the lowest rank with one. All ranks call it together.
    subroutine share_error(comm, error)

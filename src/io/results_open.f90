@@ -7,7 +7,7 @@ module spurflex_io_results_open
    use spurflex_base_text, only: to_text
    use spurflex_external_file_lock, only: acquire_lock, file_lock, release_lock
    use spurflex_external_posix, only: check_writable
-   use spurflex_io_agreement, only: share_error
+   use spurflex_io_agreement, only: await_all, share_error
    use spurflex_io_case, only: case_type
    use spurflex_io_hdf5, only: check, start_hdf5
    use spurflex_io_provenance, only: provenance_type
@@ -63,6 +63,7 @@ contains
          if (.not. allocated(error)) call check_part(case%output%file, error)
          if (.not. allocated(error)) call make_part(case%output%file, case, provenance, replace, error)
       end if
+      call await_all(comm)
       call share_error(comm, error)
       if (.not. allocated(error)) then
          ! An existing file is replaced only when every rank can go on with the new one.
