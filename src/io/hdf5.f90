@@ -2,17 +2,18 @@
 !> Every status of the library is checked and becomes an `error_type`.
 module spurflex_io_hdf5
    use h5ds, only: h5dsattach_scale_f, h5dsset_scale_f
-   use hdf5, only: H5D_ALLOC_TIME_EARLY_F, H5D_CONTIGUOUS_F, H5D_FILL_TIME_ALLOC_F, H5P_DATASET_CREATE_F, &
-      H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, H5T_NATIVE_INTEGER, H5T_STD_I32LE, h5dcreate_f, h5eset_auto_f, h5open_f, &
+   use hdf5, only: H5D_ALLOC_TIME_EARLY_F, H5D_CONTIGUOUS_F, H5D_FILL_TIME_ALLOC_F, H5F_ACC_TRUNC_F, H5F_LIBVER_V110_F, &
+      H5P_DATASET_CREATE_F, H5P_FILE_ACCESS_F, H5P_FILE_CREATE_F, H5P_GROUP_CREATE_F, H5T_IEEE_F64LE, &
+      H5T_NATIVE_DOUBLE, H5T_NATIVE_INTEGER, H5T_STD_I32LE, h5dcreate_f, h5eset_auto_f, h5fcreate_f, h5gcreate_f, h5open_f, &
       h5pclose_f, h5pcreate_f, h5pset_alloc_time_f, h5pset_chunk_f, h5pset_fill_time_f, h5pset_fill_value_f, h5pset_layout_f, &
-      h5pset_obj_track_times_f, h5sclose_f, h5screate_simple_f, hid_t, hsize_t
+      h5pset_libver_bounds_f, h5pset_obj_track_times_f, h5sclose_f, h5screate_simple_f, hid_t, hsize_t
    use spurflex_base_error, only: error_type, fatal_error
    use spurflex_measure_response, only: nan
    implicit none
    private
 
    public :: start_hdf5, check
-   public :: create_dataset, make_scale, attach_scale
+   public :: make_file, make_group, create_dataset, make_scale, attach_scale
 
 contains
 
@@ -43,6 +44,50 @@ contains
       if (ierr >= 0 .or. allocated(error)) return
       call fatal_error(error, 'HDF5 cannot '//doing)
    end subroutine check
+
+   !> Make a file in the format of HDF5 1.10: what the library keeps in it for itself has checksums, and where the columns of a
+   !> dataset are follows from one number. Nothing in it tells when it was made.
+   subroutine make_file(path, file, error)
+      !> Path of the file; replaced if it exists.
+      character(len=*), intent(in) :: path
+      !> The open file.
+      integer(hid_t), intent(out) :: file
+      !> Set if it cannot be made.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer(hid_t) :: creation, access
+      integer :: ierr(7)
+
+      call h5pcreate_f(H5P_FILE_CREATE_F, creation, ierr(1))
+      call h5pset_obj_track_times_f(creation, .false., ierr(2))
+      call h5pcreate_f(H5P_FILE_ACCESS_F, access, ierr(3))
+      call h5pset_libver_bounds_f(access, H5F_LIBVER_V110_F, H5F_LIBVER_V110_F, ierr(4))
+      call h5fcreate_f(path, H5F_ACC_TRUNC_F, file, ierr(5), creation_prp=creation, access_prp=access)
+      call h5pclose_f(creation, ierr(6))
+      call h5pclose_f(access, ierr(7))
+      call check(minval(ierr), "make the file '"//path//"'", error)
+   end subroutine make_file
+
+   !> Make an empty group.
+   subroutine make_group(parent, name, group, error)
+      !> File or group.
+      integer(hid_t), intent(in) :: parent
+      !> Name of the group.
+      character(len=*), intent(in) :: name
+      !> The open group.
+      integer(hid_t), intent(out) :: group
+      !> Set if it cannot be made.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer(hid_t) :: properties
+      integer :: ierr(4)
+
+      call h5pcreate_f(H5P_GROUP_CREATE_F, properties, ierr(1))
+      call h5pset_obj_track_times_f(properties, .false., ierr(2))
+      call h5gcreate_f(parent, name, group, ierr(3), gcpl_id=properties)
+      call h5pclose_f(properties, ierr(4))
+      call check(minval(ierr), "make the group '"//name//"'", error)
+   end subroutine make_group
 
    !> Make a dataset whose whole extent is on the disk at once: reals filled with NaN, integers with 0.
    subroutine create_dataset(parent, name, extents, real_values, dataset, error, width)

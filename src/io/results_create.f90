@@ -1,12 +1,12 @@
 !> Makes the result file, complete but for the numbers, in one process.
 module spurflex_io_results_create
-   use hdf5, only: H5F_ACC_TRUNC_F, H5F_SCOPE_GLOBAL_F, H5T_NATIVE_DOUBLE, h5dclose_f, h5dopen_f, h5dwrite_f, h5fclose_f, &
-      h5fcreate_f, h5fflush_f, h5gclose_f, h5gcreate_f, h5lcreate_hard_f, hid_t, hsize_t
+   use hdf5, only: H5F_SCOPE_GLOBAL_F, H5T_NATIVE_DOUBLE, h5dclose_f, h5dopen_f, h5dwrite_f, h5fclose_f, h5fflush_f, h5gclose_f, &
+      h5lcreate_hard_f, hid_t, hsize_t
    use spurflex_base_error, only: error_type, exit_mismatch, fatal_error
    use spurflex_base_kinds, only: wp
    use spurflex_external_posix, only: remove_file, rename_file, sync_file
    use spurflex_io_case, only: case_type
-   use spurflex_io_hdf5, only: attach_scale, check, create_dataset, make_scale
+   use spurflex_io_hdf5, only: attach_scale, check, create_dataset, make_file, make_group, make_scale
    use spurflex_io_hdf5_text, only: write_attribute, write_text
    use spurflex_io_provenance, only: provenance_type
    use spurflex_io_record_layout, only: file_axes, file_variables, history_group, record_spectrum, window_text
@@ -88,8 +88,7 @@ contains
       integer(hid_t) :: file
       integer :: ierr
 
-      call h5fcreate_f(path, H5F_ACC_TRUNC_F, file, ierr)
-      call check(ierr, "make the file '"//path//"'", error)
+      call make_file(path, file, error)
       if (allocated(error)) return
       call fill_file(file, case, provenance, error)
       if (.not. allocated(error)) then
@@ -171,13 +170,12 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       integer(hid_t) :: group
-      integer :: ierr(2)
+      integer :: ierr
 
-      call h5gcreate_f(file, name, group, ierr(1))
-      call check(ierr(1), "make the group '"//name//"'", error)
+      call make_group(file, name, group, error)
       if (allocated(error)) return
-      call h5gclose_f(group, ierr(2))
-      call check(ierr(2), "close the group '"//name//"'", error)
+      call h5gclose_f(group, ierr)
+      call check(ierr, "close the group '"//name//"'", error)
    end subroutine create_group
 
    !> Say how a spectrum was made.
@@ -218,8 +216,7 @@ contains
       integer(hid_t) :: group
       integer :: ierr
 
-      call h5gcreate_f(file, provenance_group, group, ierr)
-      call check(ierr, "make the group '"//provenance_group//"'", error)
+      call make_group(file, provenance_group, group, error)
       if (.not. allocated(error)) call write_text(group, deck_name, resolved, error)
       if (.not. allocated(error)) call write_text(group, version_name, provenance%version, error)
       if (.not. allocated(error)) call write_text(group, 'commit', provenance%commit, error)

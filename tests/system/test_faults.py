@@ -265,19 +265,24 @@ def places_of_values(path):
         return places
 
 
-@pytest.fixture(scope="module")
-def small(root, program, tmp_path_factory, mpiexec):
+def complete_file(root, program, mpiexec, folder, speeds):
     """A small complete file and its deck."""
-    folder = tmp_path_factory.mktemp("small")
-    deck = map_deck(root, folder, rows=2, speeds=12)
+    deck = map_deck(root, folder, rows=2, speeds=speeds)
     with Job(program, mpiexec, deck, ranks=1, folder=folder) as job:
         assert job.wait() == EXIT_COMPLETE, job.output
     return deck, folder / "map.h5"
 
 
-def test_flipped_bytes_of_metadata(program, small, tmp_path):
-    """Refused with a message, or without any harm; never a crash or a hang."""
-    deck, good = small
+@pytest.fixture(scope="module")
+def small(root, program, tmp_path_factory, mpiexec):
+    """A small complete file and its deck."""
+    return complete_file(root, program, mpiexec, tmp_path_factory.mktemp("small"), speeds=12)
+
+
+@pytest.mark.parametrize("speeds", [12, 40])
+def test_flipped_bytes_of_metadata(root, program, mpiexec, tmp_path, speeds):
+    """Refused with a message, or without any harm; never a crash or a hang. With and without columns."""
+    deck, good = complete_file(root, program, mpiexec, tmp_path / "good", speeds)
     content = good.read_bytes()
     values = [range(offset, offset + size) for offset, size in places_of_values(good)]
     metadata = [place for place in range(len(content)) if not any(place in block for block in values)]
@@ -297,11 +302,11 @@ def test_flipped_bytes_of_metadata(program, small, tmp_path):
         )
         message = done.stderr.decode(errors="replace")
         assert done.returncode in (EXIT_COMPLETE, EXIT_INTERNAL, EXIT_MISMATCH), message
+        assert (tmp_path / "map.h5").read_bytes() == bytes(bad)
         if done.returncode == EXIT_COMPLETE:
             harmless += 1
         else:
             assert message.strip()
-            assert (tmp_path / "map.h5").read_bytes() == bytes(bad)
     assert harmless < 8
 
 
