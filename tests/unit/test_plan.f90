@@ -4,7 +4,8 @@ module test_plan
    use spurflex_base_kinds, only: i8
    use spurflex_base_text, only: to_text
    use spurflex_integrate_options, only: start_down, start_rest, start_static, start_up
-   use spurflex_io_case, only: case_type
+   use spurflex_io_case, only: case_type, sweep_spec
+   use spurflex_io_results_layout, only: variable_type, flexible_variables, width_of
    use spurflex_measure_record, only: observable_of
    use spurflex_measure_response, only: status_diverged, status_missing, status_not_settled, status_settled
    use spurflex_sweep_plan, only: chunk_type, describe_plan, is_chained, plan_grid, plan_row
@@ -31,6 +32,7 @@ contains
                   new_unittest('chunks cover the missing points once', test_cover), &
                   new_unittest('no chunk is larger than it may be', test_sizes), &
                   new_unittest('neighbouring missing points make tiles', test_tiles), &
+                  new_unittest('tiles keep to the columns of the file', test_columns), &
                   new_unittest('chained rows are whole', test_rows), &
                   new_unittest('softest support first', test_order), &
                   new_unittest('the rigid support is row 0', test_rigid), &
@@ -214,6 +216,33 @@ contains
          end do
       end do
    end subroutine test_tiles
+
+   !> On a grid of many rows no tile crosses the border of a column, and large ones fill it.
+   subroutine test_columns(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer, parameter :: speeds = 571, rows = 91
+      type(case_type) :: case
+      type(variable_type), allocatable :: variables(:)
+      integer, allocatable :: status(:, :)
+      integer :: column, ranks
+
+      allocate (variables, source=flexible_variables(sweep_spec(flexible=.true.)))
+      column = width_of(variables(1), speeds)
+      case%solver%start = start_static
+      allocate (status(speeds, rows), source=status_missing)
+      do ranks = 1, 100
+         associate (chunks => plan_grid(case, status, ranks))
+            call check(error, all((chunks%first - 1)/column == (chunks%first + chunks%count - 2)/column), 'borders on ' &
+                       //to_text(ranks)//' ranks')
+            if (allocated(error)) return
+            if (ranks > 2) cycle
+            call check(error, maxval(chunks%count), column, 'width of a large tile')
+            if (allocated(error)) return
+         end associate
+      end do
+   end subroutine test_columns
 
    !> Chained rows are whole, side by side where several are missing; every row of which any point is missing is in one chunk,
    !> and the others are in none.
