@@ -94,9 +94,8 @@ contains
 
       type(transient_type) :: transients(size(motions))
       type(candidate_type) :: candidates(size(motions))
-      integer :: next_look, i
+      integer :: next_look, until, i
       integer, allocatable :: left(:)
-      logical :: is_last
 
       do i = 1, size(motions)
          call begin_transient(points%weight(:, i), points%in_use(:, i), starts(:, i), transients(i))
@@ -113,11 +112,10 @@ contains
                      .and. transients(left)%periods < options%max_periods)
          if (size(left) == 0) exit
          if (next_look <= options%max_periods) then
-            ! A tangent takes its own direction in the watch before the first one that can decide on the class.
-            is_last = 2*next_look > options%max_periods
+            until = merge(options%max_periods, next_look, 2*next_look > options%max_periods)
             do i = 1, size(left)
-               call watch_from_now(transients(left(i)), merge(options%max_periods, next_look, is_last), &
-                                   grows=next_look >= fewest_periods/2)
+               ! A tangent is worth while in a watch that can decide on the class.
+               call watch_from_now(transients(left(i)), until, grows=until - next_look/2 >= fewest_periods)
             end do
          end if
          call advance_transients(points, left, spread(min(next_look, options%max_periods), 1, size(left)), transients, visitor)
@@ -369,7 +367,7 @@ contains
          motion%motion = motion_chaotic
          if (transient%periods >= most_periods) motion%status = status_settled
       else if (wander <= neutral_growth*min(real(periods, wp)/(whole_watch*real(last_watch(most_periods), wp)), 1.0_wp) &
-               .and. .not. drifts(transient)) then
+               .and. .not. drifts(transient, at_last=transient%periods >= most_periods)) then
          motion%motion = motion_quasi_periodic
          motion%status = status_settled
       end if

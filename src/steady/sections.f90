@@ -25,6 +25,8 @@ module spurflex_steady_sections
       procedure :: add
       !> How nearly the motion repeats after some periods.
       procedure :: distance
+      !> Where the motion goes from return to return.
+      procedure :: return_direction
       !> How large the motion is.
       procedure :: scale => largest_norm
    end type section_ring
@@ -68,6 +70,24 @@ contains
       if (periods > min(longest_period, self%seen - 1)) return
       distance = weighted_norm(self%weight, self%sections(:, column(self, 0)) - self%sections(:, column(self, periods)))
    end function distance
+
+   !> Unit vector from the nearest of the earlier sections to the latest one, shape (size): on a torus nearly a tangent of it, near
+   !> a periodic motion nearly the direction in which the transient decays last. Zero where the two are the same.
+   pure function return_direction(self) result(direction)
+      !> Ring.
+      class(section_ring), intent(in) :: self
+      !> The direction.
+      real(wp) :: direction(size(self%weight))
+
+      integer :: nearest, k
+
+      nearest = 1
+      do k = 2, longest_period
+         if (self%distance(k) < self%distance(nearest)) nearest = k
+      end do
+      direction = self%sections(:, column(self, 0)) - self%sections(:, column(self, nearest))
+      direction = direction/max(weighted_norm(self%weight, direction), tiny(1.0_wp))
+   end function return_direction
 
    !> Largest norm among the sections [m].
    pure function largest_norm(self) result(norm)

@@ -13,8 +13,8 @@ module spurflex_steady_transient
    !> A state of this norm has left every physical range; far below overflow [m].
    real(wp), parameter :: diverged_norm = 1.0e100_wp
 
-   !> Relative difference of the ranges of two halves of a motion that has arrived.
-   real(wp), parameter :: same_range = 0.05_wp
+   !> Relative difference of the ranges of two halves of a motion that has arrived; of one that cannot be watched any longer.
+   real(wp), parameter :: same_range = 0.025_wp, same_range_at_last = 0.05_wp
 
    !> A transient under way.
    type :: transient_type
@@ -65,10 +65,17 @@ contains
       !> The growth of a tangent is wanted.
       logical, intent(in) :: grows
 
+      real(wp) :: direction(size(transient%state))
+
       call transient%growth%reset()
       transient%low = huge(1.0_wp)
       transient%high = -huge(1.0_wp)
       transient%half = (transient%periods + until)/2
+      if (grows .and. .not. transient%grows) then
+         ! Any tangent turns into the direction that grows most, or decays least, but on a torus only slowly.
+         direction = transient%ring%return_direction()
+         if (any(abs(direction) > 0.0_wp)) transient%tangent = direction
+      end if
       transient%grows = grows
    end subroutine watch_from_now
 
@@ -164,16 +171,18 @@ contains
    end subroutine see_section
 
    !> A motion is still on its way: its sections range over more, or less, in the second half than in the first.
-   pure function drifts(transient) result(it_does)
+   pure function drifts(transient, at_last) result(it_does)
       !> The transient.
       type(transient_type), intent(in) :: transient
+      !> It cannot be watched any longer.
+      logical, intent(in) :: at_last
       !> It is.
       logical :: it_does
 
       real(wp) :: range(2)
 
       range = max(transient%high - transient%low, 0.0_wp)
-      it_does = abs(range(2) - range(1)) > same_range*maxval(range)
+      it_does = abs(range(2) - range(1)) > merge(same_range_at_last, same_range, at_last)*maxval(range)
    end function drifts
 
 end module spurflex_steady_transient
