@@ -72,7 +72,7 @@ contains
    end function distance
 
    !> Unit vector from the nearest of the earlier sections to the latest one, shape (size): on a torus nearly a tangent of it, near
-   !> a periodic motion nearly the direction in which the transient decays last. Zero where the two are the same.
+   !> a periodic motion nearly the direction in which the transient decays last. Zero where there is no earlier one, or the same.
    pure function return_direction(self) result(direction)
       !> Ring.
       class(section_ring), intent(in) :: self
@@ -81,6 +81,8 @@ contains
 
       integer :: nearest, k
 
+      direction = 0.0_wp
+      if (self%seen < 2) return
       nearest = 1
       do k = 2, longest_period
          if (self%distance(k) < self%distance(nearest)) nearest = k

@@ -42,6 +42,7 @@ contains
       testsuite = [ &
                   new_unittest('sections of motions of one to eight periods', test_sections), &
                   new_unittest('sections of a transient', test_transient_sections), &
+                  new_unittest('sections of a torus return along it', test_return_direction), &
                   new_unittest('one Newton iteration while contact is kept', test_affine), &
                   new_unittest('Floquet multipliers keep Liouville''s formula', test_liouville), &
                   new_unittest('no periodic motion in an unstable linear system', test_unstable), &
@@ -136,6 +137,35 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_sections
+
+   !> Between sections of a torus that come back near to each other lies its tangent; where they are the same there is none.
+   subroutine test_return_direction(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      real(wp), parameter :: turn = 2.399963229728653_wp, weight(2) = [1.0_wp, 2.0_wp]
+      real(wp) :: direction(2), tangent(2), angle
+      type(section_ring) :: ring
+      integer :: i
+
+      call ring%reset(weight)
+      call ring%add([1.0_wp, 0.0_wp])
+      call check(error, all(abs(ring%return_direction()) <= 0.0_wp), 'no direction from a single section')
+      if (allocated(error)) return
+      do i = 1, 150
+         angle = turn*real(i, wp)
+         call ring%add([cos(angle), 0.5_wp*sin(angle)])
+      end do
+      direction = ring%return_direction()
+      tangent = [-sin(angle), 0.5_wp*cos(angle)]
+      call check(error, weighted_norm(weight, direction), 1.0_wp, 1.0e-14_wp, 'a unit vector')
+      if (allocated(error)) return
+      ! The nearest return is 55 sections back, 0.051 rad away.
+      call check(error, abs(sum(weight**2*direction*tangent)), 1.0_wp, 5.0e-4_wp, 'along the tangent')
+      if (allocated(error)) return
+      call ring%add([cos(angle), 0.5_wp*sin(angle)])
+      call check(error, all(abs(ring%return_direction()) <= 0.0_wp), 'no direction between equal sections')
+   end subroutine test_return_direction
 
    !> What sections of a decay differ by; there are none before the first.
    subroutine test_transient_sections(error)
