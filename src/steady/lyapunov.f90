@@ -3,7 +3,6 @@
 !> The mesh force is continuous, so that a tangent crosses the borders of the contact without a jump of its own.
 module spurflex_steady_lyapunov
    use spurflex_base_kinds, only: wp
-   use spurflex_steady_sections, only: weighted_norm
    implicit none
    private
 
@@ -31,7 +30,7 @@ module spurflex_steady_lyapunov
    contains
       !> Begin anew.
       procedure :: reset
-      !> Take the tangent after a period and make it a unit again.
+      !> Take what a tangent has grown by over a period.
       procedure :: add
       !> Exponent and its standard error.
       procedure :: exponent => mean_growth
@@ -50,20 +49,14 @@ contains
       self%blocks = 0
    end subroutine reset
 
-   !> Take the tangent after a period and make it a unit again.
-   pure subroutine add(self, weight, tangent)
+   !> Take what a tangent has grown by over a period.
+   pure subroutine add(self, growth)
       !> Sum.
       class(lyapunov_sum), intent(inout) :: self
-      !> Weight of each component of the state, shape (size).
-      real(wp), intent(in) :: weight(:)
-      !> Tangent of unit norm a period ago; of unit norm again afterwards, shape (size).
-      real(wp), intent(inout) :: tangent(:)
+      !> Norm of the tangent over that of a period ago.
+      real(wp), intent(in) :: growth
 
-      real(wp) :: norm
-
-      norm = max(weighted_norm(weight, tangent), tiny(1.0_wp))
-      tangent = tangent/norm
-      self%open = self%open + log(norm)
+      self%open = self%open + log(max(growth, tiny(1.0_wp)))
       self%periods = self%periods + 1
       if (self%periods < self%length) return
       self%blocks = self%blocks + 1

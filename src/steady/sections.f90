@@ -4,7 +4,7 @@ module spurflex_steady_sections
    implicit none
    private
 
-   public :: section_ring, longest_period, weighted_norm
+   public :: section_ring, longest_period, weighted_norm, weighted_norms
 
    !> Longest motion looked for, in mesh periods.
    integer, parameter :: longest_period = 64
@@ -130,5 +130,23 @@ contains
       ! Displacements are far from where squares overflow; what has diverged is infinite, and may be so.
       norm = sqrt(sum((weight*state)**2))
    end function weighted_norm
+
+   !> The same of a state in each seat.
+   pure function weighted_norms(weights, states) result(norms)
+      !> Weight of each component, and states, shape (seats, size).
+      real(wp), intent(in), contiguous :: weights(:, :), states(:, :)
+      !> Norm of each state, shape (seats).
+      real(wp) :: norms(size(states, 1))
+
+      integer :: i, k
+
+      norms = 0.0_wp
+      do i = 1, size(states, 2)
+         do k = 1, size(states, 1)
+            norms(k) = norms(k) + (weights(k, i)*states(k, i))**2
+         end do
+      end do
+      norms = sqrt(norms)
+   end function weighted_norms
 
 end module spurflex_steady_sections

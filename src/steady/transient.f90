@@ -4,7 +4,7 @@ module spurflex_steady_transient
    use spurflex_base_kinds, only: wp
    use spurflex_integrate_ensemble, only: ensemble
    use spurflex_steady_lyapunov, only: lyapunov_sum
-   use spurflex_steady_sections, only: section_ring, weighted_norm
+   use spurflex_steady_sections, only: section_ring, weighted_norm, weighted_norms
    implicit none
    private
 
@@ -92,12 +92,15 @@ contains
       !> Let in between the periods.
       class(attendant), intent(inout) :: visitor
 
-      real(wp) :: states(points%seats, points%size), tangents(points%seats, 1, points%size)
-      integer :: seated(points%seats), next, k
+      real(wp), dimension(points%seats, points%size) :: states, weights
+      real(wp) :: tangents(points%seats, 1, points%size), sizes(points%seats), growth(points%seats)
+      integer :: seated(points%seats), next, k, i
       logical :: grows
 
       states = 0.0_wp
       tangents = 0.0_wp
+      weights = 0.0_wp
+      growth = 1.0_wp
       seated = 0
       next = 1
       do
@@ -108,6 +111,7 @@ contains
                   call points%seat(k, members(next))
                   states(k, :) = transients(members(next))%state
                   tangents(k, 1, :) = transients(members(next))%tangent
+                  weights(k, :) = points%weight(:, members(next))
                end if
                next = next + 1
             end do
@@ -119,9 +123,14 @@ contains
          end do
          if (grows) then
             call points%advance(states, tangents)
+            growth = max(weighted_norms(weights, tangents(:, 1, :)), tiny(1.0_wp))
+            do i = 1, points%size
+               tangents(:, 1, i) = tangents(:, 1, i)/growth
+            end do
          else
             call points%advance(states)
          end if
+         sizes = weighted_norms(weights, states)
          do k = 1, points%seats
             if (seated(k) == 0) then
                ! An empty seat is integrated with the others, always from zero, so that nothing can overflow.
@@ -130,8 +139,10 @@ contains
                cycle
             end if
             associate (transient => transients(members(seated(k))))
-               call see_section(points%weight(:, members(seated(k))), states(k, :), tangents(k, 1, :), transient)
+               call see_section(states(k, :), sizes(k), growth(k), transient)
+               if (grows .and. .not. transient%grows) tangents(k, 1, :) = transient%tangent
                if (transient%sound .and. transient%periods < until(seated(k))) cycle
+               transient%state = states(k, :)
                transient%tangent = tangents(k, 1, :)
                seated(k) = 0
                states(k, :) = 0.0_wp
@@ -142,28 +153,19 @@ contains
    end subroutine advance_transients
 
    !> See the next section of a transient.
-   pure subroutine see_section(weight, state, tangent, transient)
-      !> Weights of the states, shape (size).
-      real(wp), intent(in) :: weight(:)
-      !> The section, shape (size).
-      real(wp), intent(in) :: state(:)
-      !> The tangent, made a unit again while its growth is summed, shape (size).
-      real(wp), intent(inout) :: tangent(:)
+   pure subroutine see_section(state, norm, growth, transient)
+      !> The section, shape (size), and its norm [m].
+      real(wp), intent(in) :: state(:), norm
+      !> What the tangent has grown by.
+      real(wp), intent(in) :: growth
       !> The transient.
       type(transient_type), intent(inout) :: transient
 
-      real(wp) :: norm
       integer :: which
 
-      if (transient%grows) then
-         call transient%growth%add(weight, tangent)
-      else
-         tangent = transient%tangent
-      end if
-      transient%state = state
+      if (transient%grows) call transient%growth%add(growth)
       transient%periods = transient%periods + 1
       call transient%ring%add(state)
-      norm = weighted_norm(weight, state)
       transient%sound = norm < diverged_norm
       which = merge(1, 2, transient%periods <= transient%half)
       transient%low(which) = min(transient%low(which), norm)

@@ -456,11 +456,8 @@ contains
          call growth%reset()
          do k = 1, settling + summed
             call map%advance(state, tangent)
-            if (k <= settling) then
-               tangent = tangent/weighted_norm(map%weight, tangent(1, :))
-            else
-               call growth%add(map%weight, tangent(1, :))
-            end if
+            if (k > settling) call growth%add(weighted_norm(map%weight, tangent(1, :)))
+            tangent = tangent/weighted_norm(map%weight, tangent(1, :))
          end do
          call growth%exponent(exponent, exponent_error, periods, wander)
          call check(error, exponent, log(modulus)/real(repeats(case_number), wp), wandering/real(periods, wp), &
