@@ -5,7 +5,10 @@ module spurflex_integrate_lane_contact
    implicit none
    private
 
-   public :: set_law, solve, find_margin, set_gain, force_at
+   public :: set_law, solve, find_margin, set_gain, force_at, nothing_added
+
+   !> Derivative of what is added to N where no lane leaves its branch.
+   real(wp), parameter :: nothing_added(lanes, points, points) = 0.0_wp
 
 contains
 
@@ -139,40 +142,30 @@ contains
    end function lowest
 
    !> Derivative of N by what comes into a step.
-   pure subroutine set_gain(rule, slope, added_slope, crosses, gain)
+   pure subroutine set_gain(rule, slope, added_slope, gain)
       !> Coefficients.
       type(lane_rule), intent(in) :: rule
       !> Derivative of N on the branch.
       real(wp), intent(in) :: slope(lanes, points)
-      !> The same of what was added; valid where something was.
+      !> The same of what was added, or `nothing_added`.
       real(wp), intent(in) :: added_slope(lanes, points, points)
-      !> Something was added.
-      logical, intent(in) :: crosses
       !> Row: N at each point; column: x at the start, free x in the middle, free x at the end.
       real(wp), intent(out) :: gain(lanes, points, points)
 
-      real(wp), dimension(lanes, points, points) :: law
-      real(wp), dimension(points) :: p, q
-      real(wp) :: a, b, c, d, scale, g21, g22, g23, g31, g32, g33
-      integer :: l, i
+      real(wp) :: law(points, points), p(points), q(points), a, b, c, d, scale, g21, g22, g23, g31, g32, g33
+      integer :: l, i, j
 
-      if (crosses) then
-         law = added_slope
-      else
-         law = 0.0_wp
-      end if
-      do i = 1, points
-         do l = 1, lanes
-            law(l, i, i) = law(l, i, i) + slope(l, i)
-         end do
-      end do
       do l = 1, lanes
-         p(1) = rule%middle(l, 1)*law(l, 1, 1) + rule%middle(l, 2)*law(l, 2, 1) + rule%middle(l, 3)*law(l, 3, 1)
-         p(2) = rule%middle(l, 1)*law(l, 1, 2) + rule%middle(l, 2)*law(l, 2, 2) + rule%middle(l, 3)*law(l, 3, 2)
-         p(3) = rule%middle(l, 1)*law(l, 1, 3) + rule%middle(l, 2)*law(l, 2, 3) + rule%middle(l, 3)*law(l, 3, 3)
-         q(1) = rule%end(l, 1)*law(l, 1, 1) + rule%end(l, 2)*law(l, 2, 1) + rule%end(l, 3)*law(l, 3, 1)
-         q(2) = rule%end(l, 1)*law(l, 1, 2) + rule%end(l, 2)*law(l, 2, 2) + rule%end(l, 3)*law(l, 3, 2)
-         q(3) = rule%end(l, 1)*law(l, 1, 3) + rule%end(l, 2)*law(l, 2, 3) + rule%end(l, 3)*law(l, 3, 3)
+         do j = 1, points
+            do i = 1, points
+               law(i, j) = added_slope(l, i, j)
+            end do
+            law(j, j) = law(j, j) + slope(l, j)
+         end do
+         do j = 1, points
+            p(j) = rule%middle(l, 1)*law(1, j) + rule%middle(l, 2)*law(2, j) + rule%middle(l, 3)*law(3, j)
+            q(j) = rule%end(l, 1)*law(1, j) + rule%end(l, 2)*law(2, j) + rule%end(l, 3)*law(3, j)
+         end do
          a = 1.0_wp + p(2)
          b = p(3)
          c = q(2)
@@ -184,15 +177,11 @@ contains
          g33 = scale*a
          g21 = -(g22*p(1) + g23*q(1))
          g31 = -(g32*p(1) + g33*q(1))
-         gain(l, 1, 1) = law(l, 1, 1) + law(l, 1, 2)*g21 + law(l, 1, 3)*g31
-         gain(l, 2, 1) = law(l, 2, 1) + law(l, 2, 2)*g21 + law(l, 2, 3)*g31
-         gain(l, 3, 1) = law(l, 3, 1) + law(l, 3, 2)*g21 + law(l, 3, 3)*g31
-         gain(l, 1, 2) = law(l, 1, 2)*g22 + law(l, 1, 3)*g32
-         gain(l, 2, 2) = law(l, 2, 2)*g22 + law(l, 2, 3)*g32
-         gain(l, 3, 2) = law(l, 3, 2)*g22 + law(l, 3, 3)*g32
-         gain(l, 1, 3) = law(l, 1, 2)*g23 + law(l, 1, 3)*g33
-         gain(l, 2, 3) = law(l, 2, 2)*g23 + law(l, 2, 3)*g33
-         gain(l, 3, 3) = law(l, 3, 2)*g23 + law(l, 3, 3)*g33
+         do i = 1, points
+            gain(l, i, 1) = law(i, 1) + law(i, 2)*g21 + law(i, 3)*g31
+            gain(l, i, 2) = law(i, 2)*g22 + law(i, 3)*g32
+            gain(l, i, 3) = law(i, 2)*g23 + law(i, 3)*g33
+         end do
       end do
    end subroutine set_gain
 

@@ -17,6 +17,9 @@ module spurflex_integrate_lane_crossing
    !> Times that a step with a crossing is solved: each reduces what is left by about (omega h)^2/12.
    integer, parameter :: corrections = 2
 
+   !> Borders of the backlash.
+   integer, parameter :: most_borders = 2
+
    !> Curvature of a deflection over a step that is none [m].
    real(wp), parameter :: no_curvature = 1.0e-200_wp
 
@@ -63,31 +66,38 @@ contains
       logical, intent(in) :: with_slope
 
       real(wp), dimension(lanes, points) :: added, corrected, forces
+      real(wp), dimension(lanes, most_borders) :: flank, beyond
       real(wp), dimension(lanes) :: from, until
-      real(wp) :: beyond(lanes, -1:1)
       type(parabola_type) :: gap
-      logical :: concerned(-1:1)
-      integer :: k, l, border
+      integer :: k, l, border, borders
 
       ! Which borders are crossed is told by the deflection that the branch alone would have.
-      do border = -1, 1, 2
-         call set_clearance(rule, pitch, place, border, side, x, gap)
+      flank(:, 1) = -1.0_wp
+      flank(:, 2) = 1.0_wp
+      do border = 1, most_borders
+         call set_clearance(rule, pitch, place, flank(:, border), side, x, gap)
          do l = 1, lanes
             beyond(l, border) = min(gap%s(l) + 0.5_wp*gap%p(l) + 0.25_wp*gap%q(l), gap%s(l) + gap%p(l) + gap%q(l), &
                                     merge(min(4.0_wp*gap%q(l)*gap%s(l) - gap%p(l)*gap%p(l), 0.0_wp), 0.0_wp, &
                                           gap%p(l) < 0.0_wp .and. gap%p(l) + 2.0_wp*gap%q(l) > 0.0_wp))
             beyond(l, border) = merge(beyond(l, border), 1.0_wp, margin(l) < 0.0_wp)
          end do
-         concerned(border) = minval(beyond(:, border)) < 0.0_wp
       end do
+      ! Hardly ever a lane crosses both in one step: each has its own one for the first.
+      do l = 1, lanes
+         flank(l, 1) = merge(-1.0_wp, 1.0_wp, beyond(l, 1) < 0.0_wp)
+         from(l) = merge(beyond(l, 1), beyond(l, 2), beyond(l, 1) < 0.0_wp)
+         beyond(l, 2) = merge(beyond(l, 2), 1.0_wp, beyond(l, 1) < 0.0_wp)
+         beyond(l, 1) = from(l)
+      end do
+      borders = merge(most_borders, 1, minval(beyond(:, 2)) < 0.0_wp)
       corrected = x
       do k = 1, corrections
          added = rest
-         do border = -1, 1, 2
-            if (.not. concerned(border)) cycle
-            call set_clearance(rule, pitch, place, border, side, corrected, gap)
+         do border = 1, borders
+            call set_clearance(rule, pitch, place, flank(:, border), side, corrected, gap)
             call set_part(gap, beyond(:, border), from, until)
-            call add_force(pitch, place, border, gap, from, until, added)
+            call add_force(pitch, place, flank(:, border), gap, from, until, added)
          end do
          call solve(rule, free_middle, free_end, slope, added, corrected, forces)
       end do
@@ -97,25 +107,25 @@ contains
             n(l, k) = merge(forces(l, k), n(l, k), margin(l) < 0.0_wp)
          end do
       end do
-      added_slope = 0.0_wp
-      do border = -1, 1, 2
-         if (.not. concerned(border)) cycle
-         call set_clearance(rule, pitch, place, border, side, x, gap)
-         call reach(border, pitch%half_backlash, gap, beyond(:, border), smallest, largest)
+      do border = 1, borders
+         call set_clearance(rule, pitch, place, flank(:, border), side, x, gap)
+         call reach(flank(:, border), pitch%half_backlash, gap, beyond(:, border), smallest, largest)
          if (.not. with_slope) cycle
          call set_part(gap, beyond(:, border), from, until)
-         call add_slope(pitch, place, gap, from, until, added_slope)
+         call add_slope(pitch, place, gap, from, until, border == 1, added_slope)
       end do
    end subroutine correct
 
    !> Clearance to a border over a step, positive on the side on which the step begins.
-   pure subroutine set_clearance(rule, pitch, place, border, side, x, gap)
+   pure subroutine set_clearance(rule, pitch, place, flank, side, x, gap)
       !> Coefficients.
       type(lane_rule), intent(in) :: rule
       !> The mesh.
       type(mesh_cycle), intent(in) :: pitch
-      !> Index of the start of the step in the cycle; border: 1 working flank, -1 back flank.
-      integer, intent(in) :: place, border
+      !> Index of the start of the step in the cycle.
+      integer, intent(in) :: place
+      !> Border of each lane: 1 working flank, -1 back flank.
+      real(wp), intent(in) :: flank(lanes)
       !> Branch at the start.
       real(wp), intent(in) :: side(lanes)
       !> g.q at each point [m].
@@ -123,15 +133,14 @@ contains
       !> The clearance.
       type(parabola_type), intent(out) :: gap
 
-      real(wp) :: sign_of, start, middle, end, flank
+      real(wp) :: sign_of, start, middle, end
       integer :: l
 
-      flank = real(border, wp)
       do l = 1, lanes
-         sign_of = merge(1.0_wp, -1.0_wp, abs(side(l) - flank) < 0.5_wp)
-         start = sign_of*(flank*(rule%static(l) + pitch%error(place) + x(l, 1)) - pitch%half_backlash)
-         middle = sign_of*(flank*(rule%static(l) + pitch%error(place + 1) + x(l, 2)) - pitch%half_backlash)
-         end = sign_of*(flank*(rule%static(l) + pitch%error(place + 2) + x(l, 3)) - pitch%half_backlash)
+         sign_of = merge(1.0_wp, -1.0_wp, abs(side(l) - flank(l)) < 0.5_wp)
+         start = sign_of*(flank(l)*(rule%static(l) + pitch%error(place) + x(l, 1)) - pitch%half_backlash)
+         middle = sign_of*(flank(l)*(rule%static(l) + pitch%error(place + 1) + x(l, 2)) - pitch%half_backlash)
+         end = sign_of*(flank(l)*(rule%static(l) + pitch%error(place + 2) + x(l, 3)) - pitch%half_backlash)
          gap%begins(l) = sign_of
          gap%s(l) = start
          gap%p(l) = 4.0_wp*middle - 3.0_wp*start - end
@@ -168,9 +177,9 @@ contains
    end subroutine set_part
 
    !> How far the deflection of the lanes beyond a border turns between the points of the step.
-   pure subroutine reach(border, half_backlash, gap, beyond, smallest, largest)
-      !> Border.
-      integer, intent(in) :: border
+   pure subroutine reach(flank, half_backlash, gap, beyond, smallest, largest)
+      !> Border of each lane.
+      real(wp), intent(in) :: flank(lanes)
       !> Half of the backlash [m].
       real(wp), intent(in) :: half_backlash
       !> Clearance.
@@ -180,27 +189,28 @@ contains
       !> Extremes of the mesh deflection so far [m].
       real(wp), intent(inout) :: smallest(lanes), largest(lanes)
 
-      real(wp) :: s, p, q, extreme, flank
+      real(wp) :: s, p, q, extreme
       integer :: l
 
-      flank = real(border, wp)
       do l = 1, lanes
          s = gap%s(l)
          p = gap%p(l)
          q = gap%q(l)
          extreme = merge(s - p*p/(4.0_wp*merge(q, 1.0_wp, abs(q) > no_curvature)), s, p < 0.0_wp .and. p + 2.0_wp*q > 0.0_wp)
-         extreme = flank*(gap%begins(l)*extreme + half_backlash)
+         extreme = flank(l)*(gap%begins(l)*extreme + half_backlash)
          smallest(l) = merge(min(smallest(l), extreme), smallest(l), beyond(l) < 0.0_wp)
          largest(l) = merge(max(largest(l), extreme), largest(l), beyond(l) < 0.0_wp)
       end do
    end subroutine reach
 
    !> Add what the force at a border has too little, or take off what it has too much.
-   pure subroutine add_force(pitch, place, border, gap, from, until, added)
+   pure subroutine add_force(pitch, place, flank, gap, from, until, added)
       !> The mesh.
       type(mesh_cycle), intent(in) :: pitch
-      !> Index of the start of the step in the cycle, border.
-      integer, intent(in) :: place, border
+      !> Index of the start of the step in the cycle.
+      integer, intent(in) :: place
+      !> Border of each lane.
+      real(wp), intent(in) :: flank(lanes)
       !> Clearance.
       type(parabola_type), intent(in) :: gap
       !> Part of the step.
@@ -208,35 +218,31 @@ contains
       !> What is added to N [N].
       real(wp), intent(inout) :: added(lanes, points)
 
-      real(wp), dimension(lanes) :: mean, tilt, bend
-      real(wp) :: k, kp, kq, u, value, flank
+      real(wp) :: k, kp, kq, u, value, mean, tilt, bend
       integer :: l, g
 
-      flank = real(border, wp)
       k = pitch%stiffness(place)
       kp = 4.0_wp*pitch%stiffness(place + 1) - 3.0_wp*k - pitch%stiffness(place + 2)
       kq = 2.0_wp*(k + pitch%stiffness(place + 2)) - 4.0_wp*pitch%stiffness(place + 1)
-      mean = 0.0_wp
-      tilt = 0.0_wp
-      bend = 0.0_wp
-      do g = 1, gauss
-         do l = 1, lanes
+      do l = 1, lanes
+         mean = 0.0_wp
+         tilt = 0.0_wp
+         bend = 0.0_wp
+         do g = 1, gauss
             u = from(l) + (until(l) - from(l))*gauss_place(g)
             value = gauss_weight(g)*(until(l) - from(l))*(k + u*(kp + u*kq))*(gap%s(l) + u*(gap%p(l) + u*gap%q(l)))
-            mean(l) = mean(l) + value
-            tilt(l) = tilt(l) + 3.0_wp*value*(2.0_wp*u - 1.0_wp)
-            bend(l) = bend(l) + 5.0_wp*value*(1.0_wp - 6.0_wp*u*(1.0_wp - u))
+            mean = mean + value
+            tilt = tilt + 3.0_wp*value*(2.0_wp*u - 1.0_wp)
+            bend = bend + 5.0_wp*value*(1.0_wp - 6.0_wp*u*(1.0_wp - u))
          end do
-      end do
-      do l = 1, lanes
-         added(l, 1) = added(l, 1) - flank*(mean(l) - tilt(l) + bend(l))
-         added(l, 2) = added(l, 2) - flank*(mean(l) - 0.5_wp*bend(l))
-         added(l, 3) = added(l, 3) - flank*(mean(l) + tilt(l) + bend(l))
+         added(l, 1) = added(l, 1) - flank(l)*(mean - tilt + bend)
+         added(l, 2) = added(l, 2) - flank(l)*(mean - 0.5_wp*bend)
+         added(l, 3) = added(l, 3) - flank(l)*(mean + tilt + bend)
       end do
    end subroutine add_force
 
    !> Derivative of what `add_force` adds by x at each point.
-   pure subroutine add_slope(pitch, place, gap, from, until, slope)
+   pure subroutine add_slope(pitch, place, gap, from, until, anew, slope)
       !> The mesh.
       type(mesh_cycle), intent(in) :: pitch
       !> Index of the start of the step in the cycle.
@@ -245,34 +251,43 @@ contains
       type(parabola_type), intent(in) :: gap
       !> Part of the step.
       real(wp), intent(in) :: from(lanes), until(lanes)
+      !> Nothing was added before.
+      logical, intent(in) :: anew
       !> The derivative, added to.
       real(wp), intent(inout) :: slope(lanes, points, points)
 
-      real(wp), dimension(lanes, points) :: row, column
-      real(wp) :: k, kp, kq, u, value, tilt, bend
+      real(wp) :: sums(points, points), row(points), column(points), k, kp, kq, u, value, tilt, bend
       integer :: l, g, i, j
 
       k = pitch%stiffness(place)
       kp = 4.0_wp*pitch%stiffness(place + 1) - 3.0_wp*k - pitch%stiffness(place + 2)
       kq = 2.0_wp*(k + pitch%stiffness(place + 2)) - 4.0_wp*pitch%stiffness(place + 1)
-      do g = 1, gauss
-         do l = 1, lanes
+      do l = 1, lanes
+         do j = 1, points
+            do i = 1, points
+               sums(i, j) = merge(0.0_wp, slope(l, i, j), anew)
+            end do
+         end do
+         do g = 1, gauss
             u = from(l) + (until(l) - from(l))*gauss_place(g)
             value = -gap%begins(l)*gauss_weight(g)*(until(l) - from(l))*(k + u*(kp + u*kq))
             tilt = 3.0_wp*(2.0_wp*u - 1.0_wp)
             bend = 5.0_wp*(1.0_wp - 6.0_wp*u*(1.0_wp - u))
-            row(l, 1) = value*(1.0_wp - tilt + bend)
-            row(l, 2) = value*(1.0_wp - 0.5_wp*bend)
-            row(l, 3) = value*(1.0_wp + tilt + bend)
-            column(l, 1) = (1.0_wp - 2.0_wp*u)*(1.0_wp - u)
-            column(l, 2) = 4.0_wp*u*(1.0_wp - u)
-            column(l, 3) = u*(2.0_wp*u - 1.0_wp)
+            row(1) = value*(1.0_wp - tilt + bend)
+            row(2) = value*(1.0_wp - 0.5_wp*bend)
+            row(3) = value*(1.0_wp + tilt + bend)
+            column(1) = (1.0_wp - 2.0_wp*u)*(1.0_wp - u)
+            column(2) = 4.0_wp*u*(1.0_wp - u)
+            column(3) = u*(2.0_wp*u - 1.0_wp)
+            do j = 1, points
+               do i = 1, points
+                  sums(i, j) = sums(i, j) + row(i)*column(j)
+               end do
+            end do
          end do
          do j = 1, points
             do i = 1, points
-               do l = 1, lanes
-                  slope(l, i, j) = slope(l, i, j) + row(l, i)*column(l, j)
-               end do
+               slope(l, i, j) = sums(i, j)
             end do
          end do
       end do

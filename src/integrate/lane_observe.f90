@@ -86,46 +86,60 @@ contains
       !> Steps per mesh period.
       integer, intent(in) :: steps
 
-      real(wp), dimension(lanes) :: first, second, third, fourth
-      integer :: s, order, i, j, l, last
+      integer :: s, last
 
       last = steps + abreast - 1
       if (allocated(self%seen)) then
          if (ubound(self%seen, 4) < last) deallocate (self%seen)
       end if
       if (.not. allocated(self%seen)) allocate (self%seen(lanes, observables, orders, 0:last))
-      ! Four steps abreast read the coefficients once; what lies behind the last step means nothing.
+      ! What lies behind the last step means nothing.
       do s = 0, steps, abreast
-         do order = 1, orders
-            do i = 1, observables
+         call see(modes, self%re, self%im, self%force, record%re(:, :, s:s + 3), record%im(:, :, s:s + 3), &
+                  record%force(:, s:s + 3), self%seen(:, :, :, s:s + 3))
+      end do
+   end subroutine observe
+
+   !> Look at four steps abreast, which read the coefficients once.
+   pure subroutine see(modes, re, im, force, z_re, z_im, n, seen)
+      !> Modes in use.
+      integer, intent(in) :: modes
+      !> Coefficients of all lanes.
+      real(wp), dimension(lanes, most_modes, observables, orders), intent(in) :: re, im
+      real(wp), intent(in) :: force(lanes, observables, orders)
+      !> Modes and N at the end of each step.
+      real(wp), intent(in) :: z_re(lanes, most_modes, abreast), z_im(lanes, most_modes, abreast), n(lanes, abreast)
+      !> What is seen.
+      real(wp), intent(out) :: seen(lanes, observables, orders, abreast)
+
+      real(wp), dimension(lanes) :: first, second, third, fourth
+      integer :: order, i, j, l
+
+      do order = 1, orders
+         do i = 1, observables
+            do l = 1, lanes
+               first(l) = force(l, i, order)*n(l, 1)
+               second(l) = force(l, i, order)*n(l, 2)
+               third(l) = force(l, i, order)*n(l, 3)
+               fourth(l) = force(l, i, order)*n(l, 4)
+            end do
+            do j = 1, modes
                do l = 1, lanes
-                  first(l) = self%force(l, i, order)*record%force(l, s)
-                  second(l) = self%force(l, i, order)*record%force(l, s + 1)
-                  third(l) = self%force(l, i, order)*record%force(l, s + 2)
-                  fourth(l) = self%force(l, i, order)*record%force(l, s + 3)
+                  first(l) = first(l) + re(l, j, i, order)*z_re(l, j, 1) - im(l, j, i, order)*z_im(l, j, 1)
+                  second(l) = second(l) + re(l, j, i, order)*z_re(l, j, 2) - im(l, j, i, order)*z_im(l, j, 2)
+                  third(l) = third(l) + re(l, j, i, order)*z_re(l, j, 3) - im(l, j, i, order)*z_im(l, j, 3)
+                  fourth(l) = fourth(l) + re(l, j, i, order)*z_re(l, j, 4) - im(l, j, i, order)*z_im(l, j, 4)
                end do
-               do j = 1, modes
-                  do l = 1, lanes
-                     first(l) = first(l) + self%re(l, j, i, order)*record%re(l, j, s) &
-                                - self%im(l, j, i, order)*record%im(l, j, s)
-                     second(l) = second(l) + self%re(l, j, i, order)*record%re(l, j, s + 1) &
-                                 - self%im(l, j, i, order)*record%im(l, j, s + 1)
-                     third(l) = third(l) + self%re(l, j, i, order)*record%re(l, j, s + 2) &
-                                - self%im(l, j, i, order)*record%im(l, j, s + 2)
-                     fourth(l) = fourth(l) + self%re(l, j, i, order)*record%re(l, j, s + 3) &
-                                 - self%im(l, j, i, order)*record%im(l, j, s + 3)
-                  end do
-               end do
-               do l = 1, lanes
-                  self%seen(l, i, order, s) = first(l)
-                  self%seen(l, i, order, s + 1) = second(l)
-                  self%seen(l, i, order, s + 2) = third(l)
-                  self%seen(l, i, order, s + 3) = fourth(l)
-               end do
+            end do
+            do l = 1, lanes
+               seen(l, i, order, 1) = first(l)
+               seen(l, i, order, 2) = second(l)
+               seen(l, i, order, 3) = third(l)
+               seen(l, i, order, 4) = fourth(l)
             end do
          end do
       end do
-   end subroutine observe
+   end subroutine see
 
    !> The latest period of one lane.
    subroutine take_orbit(self, lane, steps, frequency, orbit)

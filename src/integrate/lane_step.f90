@@ -1,7 +1,7 @@
 !> Several points of the grid advanced at once, a point in each lane of the processor's vectors.
 module spurflex_integrate_lane_step
    use spurflex_base_kinds, only: wp
-   use spurflex_integrate_lane_contact, only: set_law, solve, find_margin, set_gain, force_at
+   use spurflex_integrate_lane_contact, only: set_law, solve, find_margin, set_gain, force_at, nothing_added
    use spurflex_integrate_lane_crossing, only: correct
    use spurflex_integrate_lane_rule, only: lanes, most_modes, points, lane_rule, mesh_cycle, lane_gain, lane_record
    implicit none
@@ -74,7 +74,13 @@ contains
             smallest(l) = min(smallest(l), min(first, second))
             largest(l) = max(largest(l), max(first, second))
          end do
-         if (present(gain)) call set_gain(r, slope, added_slope, crosses, gain%n(:, :, :, s))
+         if (present(gain)) then
+            if (crosses) then
+               call set_gain(r, slope, added_slope, gain%n(:, :, :, s))
+            else
+               call set_gain(r, slope, nothing_added, gain%n(:, :, :, s))
+            end if
+         end if
          if (present(record)) then
             call keep(r, pitch, s - 1, x(:, 1), re, im, record)
          end if
