@@ -122,20 +122,22 @@ contains
       !> The value.
       real(wp) :: value
 
-      real(wp) :: height(size(seen, 2)), left, right, bend, top, margin
+      real(wp) :: height(0:size(seen, 2) + 1), left, right, bend, top, margin
       integer :: s, n
 
       n = size(seen, 2)
       if (size(seen, 1) == 1) then
-         height = sign_of*seen(1, :)
+         height(1:n) = sign_of*seen(1, :)
       else
-         height = sign_of*(seen(1, :)**2 + seen(2, :)**2)
+         height(1:n) = sign_of*(seen(1, :)**2 + seen(2, :)**2)
       end if
+      height(0) = height(n)
+      height(n + 1) = height(1)
       value = maxval(height)
       margin = value - peak_margin*(value - minval(height))
       do s = 1, n
-         left = height(modulo(s - 2, n) + 1)
-         right = height(modulo(s, n) + 1)
+         left = height(s - 1)
+         right = height(s + 1)
          if (height(s) < left .or. height(s) < right) cycle
          bend = 2.0_wp*height(s) - left - right
          if (.not. bend > 0.0_wp) cycle
