@@ -97,7 +97,7 @@ contains
       !> The coefficients.
       type(point_rule), intent(out) :: rule
 
-      real(wp), dimension(width) :: y_re, y_im, b_re, b_im, carry_re, carry_im
+      real(wp), dimension(width) :: y_re, y_im, b_re, b_im, carry_re, carry_im, taken
       real(wp), dimension(width, 0:last) :: moment_re, moment_im
       real(wp) :: h
       integer :: first, n, i, k
@@ -121,14 +121,16 @@ contains
          rule%half_re(first:first + n - 1) = carry_re(:n)
          rule%half_im(first:first + n - 1) = carry_im(:n)
          do i = 1, points
-            rule%middle(i) = rule%middle(i) + sum(matmul(moment_re(:n, 0:2), parabola(:, i)))
+            rule%middle(i) = rule%middle(i) + sum(weighed(moment_re, i))
          end do
          call set_point(place_of_end, y_re, y_im, b_re, b_im, carry_re, carry_im, moment_re, moment_im)
          rule%full_re(first:first + n - 1) = carry_re(:n)
          rule%full_im(first:first + n - 1) = carry_im(:n)
          do i = 1, points
-            rule%taken_re(first:first + n - 1, i) = matmul(moment_re(:n, 0:2), parabola(:, i))
-            rule%taken_im(first:first + n - 1, i) = matmul(moment_im(:n, 0:2), parabola(:, i))
+            taken = weighed(moment_re, i)
+            rule%taken_re(first:first + n - 1, i) = taken(:n)
+            taken = weighed(moment_im, i)
+            rule%taken_im(first:first + n - 1, i) = taken(:n)
          end do
       end do
       do i = 1, points
@@ -140,6 +142,18 @@ contains
          rule%taken_im(k, :) = 0.0_wp
       end do
    end subroutine new_point_rule
+
+   !> Integral over a step of the polynomial that is one at a point and zero at the others.
+   pure function weighed(moment, point) result(integral)
+      !> Integrals of the powers, shape (width, 0:last).
+      real(wp), intent(in) :: moment(width, 0:last)
+      !> The point.
+      integer, intent(in) :: point
+      !> For each mode.
+      real(wp) :: integral(width)
+
+      integral = moment(:, 0)*parabola(0, point) + moment(:, 1)*parabola(1, point) + moment(:, 2)*parabola(2, point)
+   end function weighed
 
    !> The mesh over one period.
    pure subroutine new_mesh_cycle(mesh, steps, pitch)

@@ -62,9 +62,9 @@ contains
       !> The period.
       type(orbit_type), intent(in) :: orbit
 
-      real(wp) :: square(0:orbit%samples), rate(0:orbit%samples), acceleration(0:orbit%samples)
-      real(wp) :: ignored
-      integer :: gear, last
+      real(wp), dimension(0:orbit%samples) :: square, rate, acceleration
+      real(wp) :: ignored, x, y
+      integer :: gear, last, s
 
       last = orbit%samples
       call extremes(orbit%time(:last), orbit%value(iy1, :last), orbit%rate(iy1, :last), orbit%acceleration(iy1, :last), &
@@ -73,13 +73,16 @@ contains
       self%total_square = self%total_square + sum(orbit%weight(:last)*orbit%value(iy1, :last)**2)
       self%periods = self%periods + 1
       do gear = 1, 2
-         associate (x => self%static(ix(gear)) + orbit%value(ix(gear), :last), vx => orbit%rate(ix(gear), :last), &
-                    ax => orbit%acceleration(ix(gear), :last), y => self%static(iy(gear)) + orbit%value(iy(gear), :last), &
-                    vy => orbit%rate(iy(gear), :last), ay => orbit%acceleration(iy(gear), :last))
-            square = x**2 + y**2
-            rate = 2.0_wp*(x*vx + y*vy)
-            acceleration = 2.0_wp*(vx**2 + x*ax + vy**2 + y*ay)
-         end associate
+         do s = 0, last
+            x = self%static(ix(gear)) + orbit%value(ix(gear), s)
+            y = self%static(iy(gear)) + orbit%value(iy(gear), s)
+            associate (vx => orbit%rate(ix(gear), s), ax => orbit%acceleration(ix(gear), s), &
+                       vy => orbit%rate(iy(gear), s), ay => orbit%acceleration(iy(gear), s))
+               square(s) = x**2 + y**2
+               rate(s) = 2.0_wp*(x*vx + y*vy)
+               acceleration(s) = 2.0_wp*(vx**2 + x*ax + vy**2 + y*ay)
+            end associate
+         end do
          ignored = huge(1.0_wp)
          call extremes(orbit%time(:last), square, rate, acceleration, ignored, self%largest_square(gear))
       end do

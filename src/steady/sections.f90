@@ -42,7 +42,7 @@ contains
 
       self%weight = weight
       if (allocated(self%sections)) deallocate (self%sections)
-      allocate (self%sections(size(weight), 0:longest_period), source=0.0_wp)
+      allocate (self%sections(size(weight), 0:longest_period))
       self%seen = 0
    end subroutine reset
 
