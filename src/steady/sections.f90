@@ -9,12 +9,15 @@ module spurflex_steady_sections
    !> Longest motion looked for, in mesh periods.
    integer, parameter :: longest_period = 64
 
+   !> Sections that there is room for at first: most motions are found before there are more.
+   integer, parameter :: first_room = 16
+
    !> The latest sections.
    type :: section_ring
       private
       !> Weight of each component, shape (size).
       real(wp), allocatable :: weight(:)
-      !> Sections, the one after k periods in column mod(k, longest_period + 1), shape (size, 0:longest_period).
+      !> Sections, the one after k periods in column mod(k, room), shape (size, 0:room - 1).
       real(wp), allocatable :: sections(:, :)
       !> Sections seen.
       integer :: seen = 0
@@ -42,7 +45,7 @@ contains
 
       self%weight = weight
       if (allocated(self%sections)) deallocate (self%sections)
-      allocate (self%sections(size(weight), 0:longest_period))
+      allocate (self%sections(size(weight), 0:first_room - 1))
       self%seen = 0
    end subroutine reset
 
@@ -53,9 +56,22 @@ contains
       !> State at the section, shape (size).
       real(wp), intent(in) :: state(:)
 
-      self%sections(:, mod(self%seen, longest_period + 1)) = state
+      if (self%seen == size(self%sections, 2) .and. self%seen <= longest_period) call make_room(self)
+      self%sections(:, mod(self%seen, size(self%sections, 2))) = state
       self%seen = self%seen + 1
    end subroutine add
+
+   !> Make room for as many sections as are ever asked for.
+   pure subroutine make_room(self)
+      !> Ring, full for the first time.
+      type(section_ring), intent(inout) :: self
+
+      real(wp), allocatable :: sections(:, :)
+
+      call move_alloc(self%sections, sections)
+      allocate (self%sections(size(self%weight), 0:longest_period))
+      self%sections(:, 0:self%seen - 1) = sections
+   end subroutine make_room
 
    !> Weighted distance of the latest section from the one some periods ago [m].
    pure function distance(self, periods)
@@ -115,7 +131,7 @@ contains
       !> The column.
       integer :: place
 
-      place = mod(self%seen - 1 - ago, longest_period + 1)
+      place = mod(self%seen - 1 - ago, size(self%sections, 2))
    end function column
 
    !> Norm of a state: a bound of what it does to y1, to a bearing deformation or to the mesh deflection [m].
