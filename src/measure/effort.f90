@@ -8,16 +8,16 @@ module spurflex_measure_effort
    implicit none
    private
 
-   public :: effort_type, ways, stages, kinds_of_steps, stage_search, stage_measure, stage_alone
+   public :: effort_type, ways, stages, kinds_of_steps, stage_search, stage_measure, stage_alone, stage_write
 
    !> Ways: no contact loss, so that one monodromy gives the motion; Newton's method on a motion with contact loss; no periodic
    !> motion, so that the transient itself gives the class; alone, by the integrator of high order or dense Newmark steps.
    integer, parameter :: ways = 4
    integer, parameter :: way_linear = 1, way_shooting = 2, way_transient = 3, way_alone = 4
 
-   !> Stages: search for the motions in lanes, their measurement with the judge's, points alone.
-   integer, parameter :: stages = 3
-   integer, parameter :: stage_search = 1, stage_measure = 2, stage_alone = 3
+   !> Stages: search for the motions in lanes, their measurement with the judge's, points alone, writing into the result file.
+   integer, parameter :: stages = 4
+   integer, parameter :: stage_search = 1, stage_measure = 2, stage_alone = 3, stage_write = 4
 
    !> Effort so far.
    type :: effort_type

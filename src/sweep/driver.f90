@@ -12,7 +12,7 @@ module spurflex_sweep_driver
    use spurflex_io_deck, only: read_deck, parse_deck
    use spurflex_io_log, only: logger
    use spurflex_io_results, only: results_file, close_results, describe_failures
-   use spurflex_measure_effort, only: effort_type
+   use spurflex_measure_effort, only: effort_type, stage_write
    use spurflex_measure_response, only: status_missing, status_settled, status_diverged
    use spurflex_sweep_attendance, only: outcome_text
    use spurflex_sweep_checkpoint, only: check_agreement, diverged_before, find_missing, look_after_file, open_file
@@ -75,7 +75,7 @@ contains
       type(timekeeper), target :: keeper
       type(error_type), allocatable :: next
       character(len=:), allocatable :: load, failures
-      real(wp) :: window
+      real(wp) :: window, begun, opening, writing
       integer, allocatable :: rigid_status(:), status(:, :)
       real(wp), allocatable :: rigid_deformation(:, :)
       integer :: ranks, total(outcomes), left
@@ -86,6 +86,7 @@ contains
       call mpi_comm_size(comm, ranks)
       call new_timekeeper(keeper, case, comm, log%elapsed())
       call log%say(describe_plan(case)//new_line('a')//describe_ends(case))
+      begun = log%elapsed()
       call open_file(results, keeper, case, comm, fresh, error)
       if (allocated(error)) return
       call find_missing(results, case, rigid_status, status, rigid_deformation, error)
@@ -97,9 +98,11 @@ contains
          return
       end if
 
+      opening = log%elapsed() - begun
       total = 0
       left = 0
       window = 0.0_wp
+      writing = 0.0_wp
       if (any(rigid_status == status_missing)) then
          call work_through(plan_row(case, rigid_status, ranks), 'rigid support')
          if (allocated(error)) return
@@ -126,9 +129,12 @@ contains
          call describe_failures(results, case, failures)
          if (failures /= '') call log%say(failures)
       end if
+      begun = log%elapsed()
       call close_results(results, error)
       call look_after_file(keeper, case, comm, error)
       if (allocated(error)) return
+      call log%say('result file: opened in '//fixed_text(opening, 3)//' s, written in '//fixed_text(writing, 3) &
+                   //' s (all ranks), closed in '//fixed_text(log%elapsed() - begun, 3)//' s')
       call log%say('done in '//fixed_text(log%elapsed(), 2)//' s: '//outcome_text(total)//'; results in '//case%output%file)
       if (left > 0) call log%say(advice())
 
@@ -143,9 +149,9 @@ contains
 
          type(effort_type) :: effort
          integer :: finished(outcomes)
-         real(wp) :: begun
+         real(wp) :: begins
 
-         begun = log%elapsed()
+         begins = log%elapsed()
          call log%begin(support//': '//to_text(points_of(chunks))//' points on '//to_text(ranks)//' ranks')
          call work_on_chunks(case, chunks, comm, results, log, keeper, rigid_deformation, finished, effort, error)
          if (allocated(error)) then
@@ -155,8 +161,9 @@ contains
          call mpi_bcast(finished, outcomes, MPI_INTEGER, 0, comm)
          total = total + finished
          call log%say(effort%describe())
+         writing = writing + effort%seconds(stage_write)
          left = left + points_of(chunks) - sum(finished)
-         window = window + log%elapsed() - begun
+         window = window + log%elapsed() - begins
          if (left == 0) call log%finish()
       end subroutine work_through
 

@@ -8,7 +8,7 @@ module spurflex_sweep_worker
    use spurflex_io_case, only: case_type
    use spurflex_io_log, only: logger
    use spurflex_io_results, only: describe_damage, results_file, write_rigid, write_flexible
-   use spurflex_measure_effort, only: effort_type, ways, stages, kinds_of_steps
+   use spurflex_measure_effort, only: effort_type, ways, stages, stage_write, kinds_of_steps
    use spurflex_measure_points, only: solver_type, new_solver, respond
    use spurflex_measure_record, only: records
    use spurflex_measure_recorder, only: recorder_type, new_recorder, release_recorder
@@ -84,8 +84,10 @@ contains
          allocate (checksums(size(responses)), source=0_i4)
          call solve_chunk(case, chunks(number), solver, recorder, results, visitor, responses, checksums, error)
          if (allocated(error)) return
+         call solver%effort%begin()
          call write_chunk(chunks(number), responses, checksums, results, rigid_deformation, error)
          if (allocated(error)) return
+         call solver%effort%end(stage_write)
          do i = 1, size(responses)
             call visitor%schedule%count_point(responses(i)%status)
          end do
