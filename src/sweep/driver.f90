@@ -167,7 +167,7 @@ contains
          if (left == 0) call log%finish()
       end subroutine work_through
 
-      !> How to go on after an early end.
+      !> How to go on after an early end. All ranks call this together.
       function advice() result(text)
          !> A line.
          character(len=:), allocatable :: text
@@ -175,6 +175,7 @@ contains
          logical :: stops
 
          ! Another rank may have left a chunk, for a reason that holds here too.
+         call keeper%share_signal(comm)
          stops = keeper%must_stop()
          if (.not. stops) keeper%reason = 'early'
          text = 'stopped '//keeper%reason//' with '//to_text(left)//' points left; '

@@ -4,7 +4,7 @@
 !> within the wall-clock limit of the deck; the first chunk is begun whatever the limit, so that no run is in vain. It also ends
 !> early when somebody takes its result file away.
 module spurflex_sweep_timekeeper
-   use mpi_f08, only: MPI_Comm, MPI_DOUBLE_PRECISION, mpi_comm_rank, mpi_comm_size, mpi_gather
+   use mpi_f08, only: MPI_Comm, MPI_DOUBLE_PRECISION, MPI_LOGICAL, MPI_LOR, mpi_allreduce, mpi_comm_rank, mpi_comm_size, mpi_gather
    use spurflex_base_clock, only: steady_seconds
    use spurflex_base_kinds, only: wp
    use spurflex_base_text, only: to_text, fixed_text
@@ -56,6 +56,8 @@ module spurflex_sweep_timekeeper
       procedure :: end_chunk
       !> No further chunk may begin.
       procedure :: must_stop
+      !> Every rank knows of a signal that came to any.
+      procedure :: share_signal
    end type timekeeper
 
 contains
@@ -139,6 +141,20 @@ contains
       end if
       stops = len(self%reason) > 0
    end function must_stop
+
+   !> Every rank knows of a signal that came to any: to the others it may be on its way still. All ranks call this together.
+   subroutine share_signal(self, comm)
+      !> Keeper.
+      class(timekeeper), intent(inout) :: self
+      !> The ranks.
+      type(MPI_Comm), intent(in) :: comm
+
+      logical :: mine, anybodys
+
+      mine = drain_is_asked_for()
+      call mpi_allreduce(mine, anybodys, 1, MPI_LOGICAL, MPI_LOR, comm)
+      if (anybodys .and. len(self%reason) == 0) self%reason = 'by SIGUSR1'
+   end subroutine share_signal
 
    !> A limit in words.
    pure function limit_text(limit) result(text)
