@@ -55,16 +55,32 @@ class Costs:
 
 @dataclass
 class Statuses:
-    """Where a variable of statuses lies in the file."""
+    """Where a variable of statuses lies in the file: in columns of some speeds, one of all if it is in one piece."""
 
     name: str
-    offset: int
     shape: tuple
     dtype: np.dtype
+    columns: list  # of (byte offset, shape in the file)
+
+    @classmethod
+    def of(cls, variable):
+        """Those of an open variable."""
+        identifier = variable.id
+        if variable.chunks is None:
+            columns = [(identifier.get_offset(), np.atleast_2d(np.empty(variable.shape, bool)).shape)]
+        else:
+            found = [identifier.get_chunk_info(i) for i in range(identifier.get_num_chunks())]
+            found.sort(key=lambda chunk: chunk.chunk_offset[-1])
+            columns = [(chunk.byte_offset, variable.chunks) for chunk in found]
+        return cls(variable.name, variable.shape, variable.dtype, columns)
 
     def map(self, path):
-        """The statuses, flat, as the program changes them."""
-        return np.memmap(path, self.dtype, "r", self.offset, self.shape).reshape(-1)
+        """The columns, as the program changes them."""
+        return [np.memmap(path, self.dtype, "r", offset, shape) for offset, shape in self.columns]
+
+    def known(self, columns):
+        """Which points are there, flat; the last column may be wider than the grid."""
+        return (np.concatenate(columns, axis=1)[:, : self.shape[-1]] != 0).reshape(-1)
 
 
 def measure(program, name, repeats, **values):
@@ -201,7 +217,7 @@ def find_statuses(result):
     """The statuses of the flexible and of the rigid support."""
     with h5py.File(result, locking=False) as file:
         variables = [file[name] for name in ("status", "rigid_status")]
-        return [Statuses(v.name, v.id.get_offset(), v.shape, v.dtype) for v in variables]
+        return [Statuses.of(v) for v in variables]
 
 
 def shapes_of(result):
@@ -227,14 +243,14 @@ class Watched:
             values = file[self.status.name][...].reshape(-1)
             values[blank] = 0
             file[self.status.name][...] = values.reshape(self.status.shape)
-        array = self.status.map(self.result)
-        seen = array != 0
+        columns = self.status.map(self.result)
+        seen = self.status.known(columns)
         left = int(self.size - seen.sum())
         groups, group, last = [], [], 0.0
         looked = time.perf_counter()
         process = subprocess.Popen(self.command, stdout=subprocess.DEVNULL, stderr=subprocess.STDOUT)
         while left and os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
-            there = array != 0
+            there = self.status.known(columns)
             new = np.flatnonzero(there != seen)
             before, looked = looked, time.perf_counter()
             if not new.size:
