@@ -80,10 +80,11 @@ contains
                if (size(run%pieces) > 1) piece%places = [(((row - 1)*count(1) + j, j=begin, end), row=1, product(count(2:)))]
                call h5screate_simple_f(size(count), piece%extents, piece%memory_space, ierr)
                call check(ierr, 'select a run of points', error)
+               if (allocated(error)) return
             end associate
          end do
       end associate
-      if (.not. allocated(error)) call select_piece(run, run%pieces(1), error)
+      call select_piece(run, run%pieces(1), error)
    end subroutine select_run
 
    !> Select a piece of a run.
@@ -136,6 +137,7 @@ contains
                call h5dwrite_f(dataset, H5T_NATIVE_DOUBLE, values, piece%extents, ierr, piece%memory_space, run%file_space)
             else
                call select_piece(run, piece, error)
+               if (allocated(error)) return
                mine = values(piece%places)
                call h5dwrite_f(dataset, H5T_NATIVE_DOUBLE, mine, piece%extents, ierr, piece%memory_space, run%file_space)
             end if
@@ -165,6 +167,7 @@ contains
                call h5dwrite_f(dataset, H5T_NATIVE_INTEGER, values, piece%extents, ierr, piece%memory_space, run%file_space)
             else
                call select_piece(run, piece, error)
+               if (allocated(error)) return
                mine = values(piece%places)
                call h5dwrite_f(dataset, H5T_NATIVE_INTEGER, mine, piece%extents, ierr, piece%memory_space, run%file_space)
             end if
@@ -194,6 +197,7 @@ contains
                call h5dread_f(dataset, H5T_NATIVE_DOUBLE, values, piece%extents, ierr, piece%memory_space, run%file_space)
             else
                call select_piece(run, piece, error)
+               if (allocated(error)) return
                mine = values(piece%places)
                call h5dread_f(dataset, H5T_NATIVE_DOUBLE, mine, piece%extents, ierr, piece%memory_space, run%file_space)
                values(piece%places) = mine
@@ -224,6 +228,7 @@ contains
                call h5dread_f(dataset, H5T_NATIVE_INTEGER, values, piece%extents, ierr, piece%memory_space, run%file_space)
             else
                call select_piece(run, piece, error)
+               if (allocated(error)) return
                mine = values(piece%places)
                call h5dread_f(dataset, H5T_NATIVE_INTEGER, mine, piece%extents, ierr, piece%memory_space, run%file_space)
                values(piece%places) = mine

@@ -279,7 +279,7 @@ contains
          extents(i) = size(axes(chosen(i))%values)
       end do
       call create_dataset(file, trim(variable%name), extents, variable%kind == real_value, dataset, error, &
-                          width_of(variable, extents(1)))
+                          width_of(variable, extents))
       if (allocated(error)) return
       do i = 1, size(chosen)
          call attach_scale(dataset, scales(chosen(i)), i, size(chosen), error)

@@ -36,8 +36,9 @@ module spurflex_io_results_layout
    integer, parameter :: most_dimensions = 3
 
    !> Speeds of a column. What stands on the grid is stored in columns of so many speeds and every support stiffness: what is
-   !> found out about neighbouring points, as wide as a column, is one piece of the file then, not one for each stiffness.
-   integer, parameter :: column_speeds = 32
+   !> found out about neighbouring points, as wide as a column, is one piece of the file then, not one for each stiffness. For
+   !> fewer stiffnesses than these that is not worth while.
+   integer, parameter :: column_speeds = 32, fewest_rows = 8
 
    !> What a variable holds: reals, plain integers, or one of the sets of flags.
    integer, parameter :: real_value = 0, plain_integer = 1, motion_flag = 2, status_flag = 3, contact_flag = 4, &
@@ -229,16 +230,17 @@ contains
 
    !> How many elements of its first dimension a variable has side by side in the file: the speeds of a column where it has one
    !> number for each point of the grid, else all.
-   pure function width_of(variable, extent) result(width)
+   pure function width_of(variable, extents) result(width)
       !> The variable.
       type(variable_type), intent(in) :: variable
-      !> Its extent along the first dimension.
-      integer, intent(in) :: extent
+      !> Its extents, fastest first, shape (dimensions).
+      integer, intent(in) :: extents(:)
       !> The width; it is stored in columns where that is less than the extent.
       integer :: width
 
-      width = extent
-      if (all(variable%axes == [character(len=name_length) :: speed_axis, stiffness_axis, ''])) width = min(extent, column_speeds)
+      width = extents(1)
+      if (any(variable%axes /= [character(len=name_length) :: speed_axis, stiffness_axis, ''])) return
+      if (extents(2) >= fewest_rows) width = min(width, column_speeds)
    end function width_of
 
    !> The flags of an integer variable, as CF has them.

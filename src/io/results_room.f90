@@ -61,24 +61,18 @@ contains
 
       type(axis_type), allocatable :: axes(:)
       type(variable_type), allocatable :: variables(:)
-      integer(i8) :: elements
-      integer :: i, j, extent, width
+      integer, allocatable :: extents(:)
+      integer :: i, j, k, width
 
       allocate (axes, source=file_axes(case))
       allocate (variables, source=file_variables(case))
       bytes = 0_i8
       do i = 1, size(variables)
-         elements = 1_i8
-         do j = 1, size(axes)
-            if (all(variables(i)%axes /= axes(j)%name)) cycle
-            extent = size(axes(j)%values)
-            if (variables(i)%axes(1) == axes(j)%name) then
-               width = width_of(variables(i), extent)
-               extent = ((extent - 1)/width + 1)*width
-            end if
-            elements = elements*extent
-         end do
-         bytes = bytes + elements*merge(real_bytes, integer_bytes, variables(i)%kind == real_value)
+         extents = [((pack([size(axes(j)%values)], variables(i)%axes(k) == axes(j)%name), j=1, size(axes)), &
+                     k=1, size(variables(i)%axes))]
+         width = width_of(variables(i), extents)
+         extents(1) = ((extents(1) - 1)/width + 1)*width
+         bytes = bytes + product(int(extents, i8))*merge(real_bytes, integer_bytes, variables(i)%kind == real_value)
       end do
    end function array_bytes
 

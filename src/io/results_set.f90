@@ -1,4 +1,4 @@
-!> The open variables of one support: one hyperslab write a variable, the status last.
+!> The open variables of one support: one write a variable, or one for each of its columns, the status last.
 module spurflex_io_results_set
    use hdf5, only: h5dclose_f, h5dget_space_f, h5dopen_f, h5sclose_f, h5sget_simple_extent_dims_f, &
       h5sget_simple_extent_ndims_f, hid_t, hsize_t
@@ -49,7 +49,7 @@ contains
 
       set%variables = variables
       set%extents = extents
-      if (size(variables) > 0) set%width = width_of(variables(1), extents(1))
+      if (size(variables) > 0) set%width = width_of(variables(1), extents)
       allocate (set%datasets(0))
       do i = 1, size(variables)
          call h5dopen_f(file, trim(variables(i)%name), space, ierr(1))

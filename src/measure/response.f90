@@ -3,6 +3,7 @@ module spurflex_measure_response
    use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan, ieee_is_finite
    use spurflex_base_kinds, only: wp
    use spurflex_model_equations, only: equations_type
+   use spurflex_steady_lyapunov, only: unknown
    use spurflex_steady_outcome, only: status_missing, status_settled, status_not_settled, status_diverged, status_inaccurate, &
       reason_none, reason_non_finite, reason_no_step, reason_max_periods, reason_given_steps, reason_most_steps, &
       reason_not_confirmed, contact_kept, contact_lost, contact_both_flanks, motion_unresolved, motion_quasi_periodic, &
@@ -92,8 +93,10 @@ contains
       answer%reason = motion%reason
       answer%motion = motion%motion
       answer%periods_integrated = motion%periods_integrated
-      answer%lyapunov_exponent = motion%lyapunov_exponent
-      answer%lyapunov_error = motion%lyapunov_error
+      if (motion%lyapunov_error < unknown) then
+         answer%lyapunov_exponent = motion%lyapunov_exponent
+         answer%lyapunov_error = motion%lyapunov_error
+      end if
       if (motion%periods > 0) answer%floquet_magnitude = motion%floquet_magnitude
    end subroutine describe_motion
 

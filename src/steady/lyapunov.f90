@@ -6,7 +6,7 @@ module spurflex_steady_lyapunov
    implicit none
    private
 
-   public :: lyapunov_sum
+   public :: lyapunov_sum, unknown
 
    !> Error of an exponent that is not known; far above any exponent.
    real(wp), parameter :: unknown = 1.0e30_wp

@@ -133,7 +133,7 @@ contains
       call close_results(results, error)
       call look_after_file(keeper, case, comm, error)
       if (allocated(error)) return
-      call log%say('result file: opened in '//fixed_text(opening, 3)//' s, written in '//fixed_text(writing, 3) &
+      call log%say('result file: opened in '//fixed_text(opening, 3)//' s, points written in '//fixed_text(writing, 3) &
                    //' s (all ranks), closed in '//fixed_text(log%elapsed() - begun, 3)//' s')
       call log%say('done in '//fixed_text(log%elapsed(), 2)//' s: '//outcome_text(total)//'; results in '//case%output%file)
       if (left > 0) call log%say(advice())

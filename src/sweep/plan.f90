@@ -1,9 +1,9 @@
 !> What has to be computed: the points of the grid that are missing, cut into chunks that are handed to ranks.
 !>
-!> A chunk is a tile of neighbouring speeds and support stiffnesses, so that its results are written in one piece and dear
-!> points, which lie together, fill the lanes of the processor's vectors. With the starts 'up' and 'down' each point begins where
-!> its neighbour ended, and a chunk is some whole rows side by side. The list runs from the softest support to the stiffest; in
-!> which order its chunks are handed out is up to the forecast.
+!> A chunk is a tile of neighbouring speeds and support stiffnesses: dear points, which lie together, fill the lanes of the
+!> processor's vectors then, and a tile as wide as a column of the result file is written in one piece. With the starts 'up' and
+!> 'down' each point begins where its neighbour ended, and a chunk is some whole rows side by side. The list runs from the
+!> softest support to the stiffest; in which order its chunks are handed out is up to the forecast.
 module spurflex_sweep_plan
    use spurflex_base_kinds, only: i8, wp
    use spurflex_base_text, only: fixed_text, to_text
@@ -113,7 +113,7 @@ contains
 
       missing = count(status == status_missing)
       length = max(1, min(smallest_chunk, missing/(ranks*fewest_chunks)), min(largest_chunk, missing/(ranks*chunks_per_rank)))
-      ! A power of two: a tile begins with a column of the result file, or several fill it.
+      ! A power of two: a tile begins with a column of the result file, or several fill it; where there are few rows it is wider.
       width = 1
       do while (2*width**2 <= aspect*length .and. 2*width <= length .and. width < size(status, 1))
          width = 2*width

@@ -10,7 +10,7 @@ module spurflex_sweep_schedule
    use spurflex_base_kinds, only: i8, wp
    use spurflex_sweep_forecast, only: forecast_type, new_forecast
    use spurflex_sweep_plan, only: chunk_type
-   use spurflex_sweep_timekeeper, only: timekeeper
+   use spurflex_sweep_timekeeper, only: timekeeper, another_stopped
    implicit none
    private
 
@@ -178,9 +178,7 @@ contains
       if (status%MPI_TAG == tag_last) then
          self%ended = self%ended + 1
          ! A rank that ends while there are chunks was told to stop: so are all.
-         if (.not. self%forecast%is_exhausted() .and. len(self%keeper%reason) == 0) then
-            self%keeper%reason = 'as another rank was asked to stop'
-         end if
+         if (.not. self%forecast%is_exhausted() .and. len(self%keeper%reason) == 0) self%keeper%reason = another_stopped
       else
          call hand_out(self, chunk)
          answer = [int(chunk, i8), microseconds(self%keeper%longest)]

@@ -14,8 +14,12 @@ module spurflex_sweep_timekeeper
    implicit none
    private
 
-   public :: timekeeper, new_timekeeper, load_text, describe_ends, stop_file
+   public :: timekeeper, new_timekeeper, load_text, describe_ends, stop_file, another_stopped
 
+   !> Reason of a rank that a signal came to.
+   character(len=*), parameter :: by_signal = 'by SIGUSR1'
+   !> Reason of a rank that only knows that another one stopped.
+   character(len=*), parameter :: another_stopped = 'as another rank was asked to stop'
    !> Added to the name of the result file: the name of the stop file.
    character(len=*), parameter :: stop_ending = '.stop'
    !> Seconds between two looks at the stop file and the result file.
@@ -130,7 +134,7 @@ contains
       if (stops) return
       now = steady_seconds()
       if (drain_is_asked_for()) then
-         self%reason = 'by SIGUSR1'
+         self%reason = by_signal
       else if (self%longest > 0.0_wp .and. now + reserve_factor*self%longest + reserve_to_close > self%deadline) then
          self%reason = 'by the wall-clock limit of '//limit_text(self%limit)
       else if (self%looks .and. now >= self%next_look) then
@@ -153,7 +157,7 @@ contains
 
       mine = drain_is_asked_for()
       call mpi_allreduce(mine, anybodys, 1, MPI_LOGICAL, MPI_LOR, comm)
-      if (anybodys .and. len(self%reason) == 0) self%reason = 'by SIGUSR1'
+      if (anybodys .and. (len(self%reason) == 0 .or. self%reason == another_stopped)) self%reason = by_signal
    end subroutine share_signal
 
    !> A limit in words.

@@ -55,7 +55,7 @@ class Costs:
 
 @dataclass
 class Statuses:
-    """Where a variable of statuses lies in the file: in columns of some speeds, one of all if it is in one piece."""
+    """Where a variable of statuses lies in the file: in columns of some speeds, or in one of all."""
 
     name: str
     shape: tuple

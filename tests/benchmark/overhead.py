@@ -39,8 +39,8 @@ def interval_of_median(values):
 
 def kept_in(run, ranks):
     """Time of a run with its file over the same time without, by what the log says that the file cost."""
-    numbers = re.search(r"result file: opened in (\S+) s, written in (\S+) s .*, closed in (\S+) s", run.log)
-    opened, written, closed = map(float, numbers.groups())
+    line = next(line for line in run.log.splitlines() if line.startswith("result file: opened"))
+    opened, written, closed = map(float, re.findall(r"in (\S+) s", line))
     kept = opened + written / ranks + closed
     return run.program_seconds / (run.program_seconds - kept)
 

@@ -229,7 +229,7 @@ contains
       integer :: column, ranks
 
       allocate (variables, source=flexible_variables(sweep_spec(flexible=.true.)))
-      column = width_of(variables(1), speeds)
+      column = width_of(variables(1), [speeds, rows])
       case%solver%start = start_static
       allocate (status(speeds, rows), source=status_missing)
       do ranks = 1, 100
