@@ -1,10 +1,14 @@
-!> A sweep that guards nothing: the points of a deck, handed out and solved as the program does it, but without result file,
-!> checksums, locks and looks at files. What the program needs more is the price of surviving, for scripts/benchmark.
+!> A sweep that guards nothing: the points of a deck, handed out and solved as the program does it, but without checkpoints,
+!> checksums, locks and looks at files. Its results go to rank 0 at the end, which writes them at once into a plain file beside
+!> the deck's, `.bare` behind its name. What the program needs more is the price of surviving, for scripts/benchmark.
 !>
 !> usage: bare_sweep DECK, on any number of ranks; the deck starts its points from `static` or `rest` and records nothing
 program bare_sweep
    use, intrinsic :: iso_fortran_env, only: error_unit
-   use mpi_f08, only: MPI_COMM_WORLD, MPI_Abort, MPI_Barrier, MPI_Comm_rank, MPI_Comm_size, MPI_Finalize, MPI_Init
+   use hdf5, only: H5F_ACC_TRUNC_F, H5T_NATIVE_DOUBLE, H5T_NATIVE_INTEGER, h5dclose_f, h5dcreate_f, h5dwrite_f, h5fclose_f, &
+      h5fcreate_f, h5sclose_f, h5screate_simple_f, hid_t, hsize_t
+   use mpi_f08, only: MPI_COMM_WORLD, MPI_DOUBLE_PRECISION, MPI_INTEGER, MPI_SUM, MPI_Abort, MPI_Barrier, MPI_Comm_rank, &
+      MPI_Comm_size, MPI_Finalize, MPI_Init, MPI_Reduce
    use spurflex_base_error, only: error_type
    use spurflex_base_kinds, only: i8, wp
    use spurflex_base_text, only: fixed_text
@@ -12,7 +16,9 @@ program bare_sweep
    use spurflex_external_threads, only: use_one_thread
    use spurflex_integrate_options, only: solver_options
    use spurflex_io_case, only: case_type
+   use spurflex_io_hdf5, only: start_hdf5
    use spurflex_io_log, only: logger, new_logger
+   use spurflex_io_results_layout, only: flexible_variables, get_values, real_value, rigid_variables, variable_type
    use spurflex_measure_points, only: new_solver, respond, solver_type
    use spurflex_measure_record, only: records
    use spurflex_measure_response, only: response, status_missing
@@ -30,7 +36,9 @@ program bare_sweep
    type(error_type), allocatable :: error
    type(logger), target :: log
    type(timekeeper), target :: keeper
+   type(response), allocatable :: known(:, :)
    integer :: rank, ranks, total(outcomes)
+   real(wp) :: begun
 
    call get_command_argument(1, deck)
    call hasten_mpi_start()
@@ -44,9 +52,14 @@ program bare_sweep
    call use_one_thread()
    keeper%reason = ''
    total = 0
+   allocate (known(case%sweep%speed_count, 0:case%sweep%stiffness_count))
+   known%status = status_missing
    if (case%sweep%rigid) call solve(plan_row(case, spread(status_missing, 1, case%sweep%speed_count), ranks))
    if (case%sweep%flexible) call solve(plan_grid(case, spread(spread(status_missing, 1, case%sweep%speed_count), 2, &
                                                               case%sweep%stiffness_count), ranks))
+   begun = log%elapsed()
+   call keep()
+   call log%say('result file: written in '//fixed_text(log%elapsed() - begun, 3)//' s')
    call log%say('done in '//fixed_text(log%elapsed(), 2)//' s: '//outcome_text(total))
    call MPI_Finalize()
 
@@ -94,6 +107,10 @@ contains
          do i = 1, size(responses)
             call visitor%schedule%count_point(responses(i)%status)
          end do
+         associate (chunk => chunks(number))
+            known(chunk%first:chunk%first + chunk%count - 1, chunk%row:chunk%row + chunk%rows - 1) = &
+               reshape(responses, [chunk%count, chunk%rows])
+         end associate
          deallocate (responses)
       end do
       call visitor%schedule%finish()
@@ -101,5 +118,61 @@ contains
       ! Requests of what follows may not reach this scheduler.
       call MPI_Barrier(MPI_COMM_WORLD)
    end subroutine solve
+
+   !> Collect all responses on rank 0 and write them.
+   subroutine keep()
+      integer(hid_t) :: file
+      integer :: ierr
+
+      if (rank == 0) then
+         call start_hdf5(error)
+         if (allocated(error)) call give_up(error%message)
+         call h5fcreate_f(case%output%file//'.bare', H5F_ACC_TRUNC_F, file, ierr)
+         if (ierr < 0) call give_up('cannot make the file')
+      end if
+      call keep_variables(file, rigid_variables(case%sweep, case%output%products), known(:, 0:0))
+      call keep_variables(file, flexible_variables(case%sweep, case%output%products), known(:, 1:))
+      if (rank == 0) call h5fclose_f(file, ierr)
+   end subroutine keep
+
+   !> Collect and write the variables of one support.
+   subroutine keep_variables(file, variables, points)
+      !> Open file; rank 0 only.
+      integer(hid_t), intent(in) :: file
+      !> The variables.
+      type(variable_type), intent(in) :: variables(:)
+      !> This rank's responses, shape (speed, row).
+      type(response), intent(in) :: points(:, :)
+
+      type(response) :: mine(size(points))
+      real(wp) :: reals(size(points)), all_reals(size(points)), eta(3, size(points))
+      integer :: integers(size(points)), all_integers(size(points)), ierr(4), i
+      integer(hid_t) :: space, dataset, kind
+
+      mine = reshape(points, [size(points)])
+      eta = 0.0_wp
+      do i = 1, size(variables)
+         reals = 0.0_wp
+         integers = 0
+         call get_values(variables(i)%quantity, mine, eta, reals, integers)
+         ! The others have zeros where these are known.
+         where (mine%status == status_missing) reals = 0.0_wp
+         where (mine%status == status_missing) integers = 0
+         call MPI_Reduce(reals, all_reals, size(reals), MPI_DOUBLE_PRECISION, MPI_SUM, 0, MPI_COMM_WORLD)
+         call MPI_Reduce(integers, all_integers, size(integers), MPI_INTEGER, MPI_SUM, 0, MPI_COMM_WORLD)
+         if (rank > 0) cycle
+         kind = merge(H5T_NATIVE_DOUBLE, H5T_NATIVE_INTEGER, variables(i)%kind == real_value)
+         call h5screate_simple_f(2, int(shape(points), hsize_t), space, ierr(1))
+         call h5dcreate_f(file, trim(variables(i)%name), kind, space, dataset, ierr(2))
+         if (variables(i)%kind == real_value) then
+            call h5dwrite_f(dataset, kind, all_reals, int(shape(points), hsize_t), ierr(3))
+         else
+            call h5dwrite_f(dataset, kind, all_integers, int(shape(points), hsize_t), ierr(3))
+         end if
+         call h5dclose_f(dataset, ierr(4))
+         if (minval(ierr) < 0) call give_up('cannot write '//trim(variables(i)%name))
+         call h5sclose_f(space, ierr(1))
+      end do
+   end subroutine keep_variables
 
 end program bare_sweep
