@@ -36,9 +36,9 @@ module spurflex_io_results_layout
    integer, parameter :: most_dimensions = 3
 
    !> Speeds of a column. What stands on the grid is stored in columns of so many speeds and every support stiffness: what is
-   !> found out about neighbouring points, as wide as a column, is one piece of the file then, not one for each stiffness. For
-   !> fewer stiffnesses than these that is not worth while.
-   integer, parameter :: column_speeds = 32, fewest_rows = 8
+   !> found out about neighbouring points, as wide as a column, is one piece of the file then, not one for each stiffness. A
+   !> single row is one piece anyway.
+   integer, parameter :: column_speeds = 32
 
    !> What a variable holds: reals, plain integers, or one of the sets of flags.
    integer, parameter :: real_value = 0, plain_integer = 1, motion_flag = 2, status_flag = 3, contact_flag = 4, &
@@ -240,7 +240,7 @@ contains
 
       width = extents(1)
       if (any(variable%axes /= [character(len=name_length) :: speed_axis, stiffness_axis, ''])) return
-      if (extents(2) >= fewest_rows) width = min(width, column_speeds)
+      if (extents(2) > 1) width = min(width, column_speeds)
    end function width_of
 
    !> The flags of an integer variable, as CF has them.

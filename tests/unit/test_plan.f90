@@ -229,6 +229,8 @@ contains
       integer :: column, ranks
 
       allocate (variables, source=flexible_variables(sweep_spec(flexible=.true.)))
+      call check(error, width_of(variables(1), [speeds, 1]), speeds, 'a single row')
+      if (allocated(error)) return
       column = width_of(variables(1), [speeds, rows])
       case%solver%start = start_static
       allocate (status(speeds, rows), source=status_missing)
