@@ -16,19 +16,18 @@ module spurflex_io_hdf5_run
 
    !> What of a run is moved at once.
    type :: piece_type
-      !> First element from 0 and extents, fastest index first, shape (dimensions).
-      integer(hsize_t), allocatable :: first(:), extents(:)
-      !> Space of the values in memory. It has the extents of the piece: the library compares other shapes element by element.
-      integer(hid_t) :: memory_space = -1_hid_t
-      !> Where its values are among those of the run, shape (elements).
-      integer, allocatable :: places(:)
+      !> First element from 0 in the file and in the run, and extents, fastest index first, shape (dimensions).
+      integer(hsize_t), allocatable :: first(:), place(:), extents(:)
    end type piece_type
 
    !> A block of elements, for every dataset of one shape.
    type :: run_type
       private
-      !> Space of the file, shared with the owner, with a piece selected.
-      integer(hid_t) :: file_space
+      !> Space of the file, shared with the owner, and of the values in memory, both with a piece selected. They have the same
+      !> dimensions: the library compares other shapes element by element.
+      integer(hid_t) :: file_space, memory_space
+      !> Extents, fastest index first, shape (dimensions).
+      integer(hsize_t), allocatable :: extents(:)
       !> The pieces, side by side along the first dimension.
       type(piece_type), allocatable :: pieces(:)
    end type run_type
@@ -62,9 +61,13 @@ contains
       !> Set if there is no such run.
       type(error_type), allocatable, intent(out) :: error
 
-      integer :: i, begin, end, row, j, ierr
+      integer :: i, begin, end, ierr
 
       run%file_space = space
+      run%extents = int(count, hsize_t)
+      call h5screate_simple_f(size(count), run%extents, run%memory_space, ierr)
+      call check(ierr, 'select a run of points', error)
+      if (allocated(error)) return
       associate (before => (first(1) - 1)/width)
          allocate (run%pieces((first(1) + count(1) - 2)/width - before + 1))
          do i = 1, size(run%pieces)
@@ -73,33 +76,33 @@ contains
                begin = max(1, (before + i - 1)*width - first(1) + 2)
                end = count(1)
                if (i < size(run%pieces)) end = (before + i)*width - first(1) + 1
-               piece%first = int(first - 1, hsize_t)
-               piece%first(1) = piece%first(1) + begin - 1
-               piece%extents = int(count, hsize_t)
+               piece%place = spread(0_hsize_t, 1, size(count))
+               piece%place(1) = begin - 1
+               piece%first = int(first - 1, hsize_t) + piece%place
+               piece%extents = run%extents
                piece%extents(1) = end - begin + 1
-               if (size(run%pieces) > 1) piece%places = [(((row - 1)*count(1) + j, j=begin, end), row=1, product(count(2:)))]
-               call h5screate_simple_f(size(count), piece%extents, piece%memory_space, ierr)
-               call check(ierr, 'select a run of points', error)
-               if (allocated(error)) return
             end associate
          end do
       end associate
-      call select_piece(run, run%pieces(1), error)
+      call select_piece(run, 1, error)
    end subroutine select_run
 
    !> Select a piece of a run.
-   subroutine select_piece(run, piece, error)
+   subroutine select_piece(run, number, error)
       !> The run.
       type(run_type), intent(in) :: run
-      !> The piece.
-      type(piece_type), intent(in) :: piece
+      !> Which piece.
+      integer, intent(in) :: number
       !> Set if there is no such piece.
       type(error_type), allocatable, intent(inout) :: error
 
-      integer :: ierr
+      integer :: ierr(2)
 
-      call h5sselect_hyperslab_f(run%file_space, H5S_SELECT_SET_F, piece%first, piece%extents, ierr)
-      call check(ierr, 'select a run of points', error)
+      associate (piece => run%pieces(number))
+         call h5sselect_hyperslab_f(run%file_space, H5S_SELECT_SET_F, piece%first, piece%extents, ierr(1))
+         call h5sselect_hyperslab_f(run%memory_space, H5S_SELECT_SET_F, piece%place, piece%extents, ierr(2))
+      end associate
+      call check(minval(ierr), 'select a run of points', error)
    end subroutine select_piece
 
    !> End a run.
@@ -109,12 +112,10 @@ contains
       !> Set if it cannot be ended.
       type(error_type), allocatable, intent(out) :: error
 
-      integer :: i, ierr
+      integer :: ierr
 
-      do i = 1, size(run%pieces)
-         call h5sclose_f(run%pieces(i)%memory_space, ierr)
-         call check(ierr, 'end a run of points', error)
-      end do
+      call h5sclose_f(run%memory_space, ierr)
+      call check(ierr, 'end a run of points', error)
    end subroutine end_run
 
    !> Write reals.
@@ -128,21 +129,13 @@ contains
       !> Set if they cannot be written.
       type(error_type), allocatable, intent(out) :: error
 
-      real(wp), allocatable :: mine(:)
       integer :: i, ierr
 
       do i = 1, size(run%pieces)
-         associate (piece => run%pieces(i))
-            if (size(run%pieces) == 1) then
-               call h5dwrite_f(dataset, H5T_NATIVE_DOUBLE, values, piece%extents, ierr, piece%memory_space, run%file_space)
-            else
-               call select_piece(run, piece, error)
-               if (allocated(error)) return
-               mine = values(piece%places)
-               call h5dwrite_f(dataset, H5T_NATIVE_DOUBLE, mine, piece%extents, ierr, piece%memory_space, run%file_space)
-            end if
-            call check(ierr, 'write the results', error)
-         end associate
+         if (size(run%pieces) > 1) call select_piece(run, i, error)
+         if (allocated(error)) return
+         call h5dwrite_f(dataset, H5T_NATIVE_DOUBLE, values, run%extents, ierr, run%memory_space, run%file_space)
+         call check(ierr, 'write the results', error)
          if (allocated(error)) return
       end do
    end subroutine write_reals
@@ -158,21 +151,13 @@ contains
       !> Set if they cannot be written.
       type(error_type), allocatable, intent(out) :: error
 
-      integer, allocatable :: mine(:)
       integer :: i, ierr
 
       do i = 1, size(run%pieces)
-         associate (piece => run%pieces(i))
-            if (size(run%pieces) == 1) then
-               call h5dwrite_f(dataset, H5T_NATIVE_INTEGER, values, piece%extents, ierr, piece%memory_space, run%file_space)
-            else
-               call select_piece(run, piece, error)
-               if (allocated(error)) return
-               mine = values(piece%places)
-               call h5dwrite_f(dataset, H5T_NATIVE_INTEGER, mine, piece%extents, ierr, piece%memory_space, run%file_space)
-            end if
-            call check(ierr, 'write the results', error)
-         end associate
+         if (size(run%pieces) > 1) call select_piece(run, i, error)
+         if (allocated(error)) return
+         call h5dwrite_f(dataset, H5T_NATIVE_INTEGER, values, run%extents, ierr, run%memory_space, run%file_space)
+         call check(ierr, 'write the results', error)
          if (allocated(error)) return
       end do
    end subroutine write_integers
@@ -188,22 +173,13 @@ contains
       !> Set if they cannot be read.
       type(error_type), allocatable, intent(out) :: error
 
-      real(wp), allocatable :: mine(:)
       integer :: i, ierr
 
       do i = 1, size(run%pieces)
-         associate (piece => run%pieces(i))
-            if (size(run%pieces) == 1) then
-               call h5dread_f(dataset, H5T_NATIVE_DOUBLE, values, piece%extents, ierr, piece%memory_space, run%file_space)
-            else
-               call select_piece(run, piece, error)
-               if (allocated(error)) return
-               mine = values(piece%places)
-               call h5dread_f(dataset, H5T_NATIVE_DOUBLE, mine, piece%extents, ierr, piece%memory_space, run%file_space)
-               values(piece%places) = mine
-            end if
-            call check(ierr, 'read the results', error)
-         end associate
+         if (size(run%pieces) > 1) call select_piece(run, i, error)
+         if (allocated(error)) return
+         call h5dread_f(dataset, H5T_NATIVE_DOUBLE, values, run%extents, ierr, run%memory_space, run%file_space)
+         call check(ierr, 'read the results', error)
          if (allocated(error)) return
       end do
    end subroutine read_reals
@@ -219,22 +195,13 @@ contains
       !> Set if they cannot be read.
       type(error_type), allocatable, intent(out) :: error
 
-      integer, allocatable :: mine(:)
       integer :: i, ierr
 
       do i = 1, size(run%pieces)
-         associate (piece => run%pieces(i))
-            if (size(run%pieces) == 1) then
-               call h5dread_f(dataset, H5T_NATIVE_INTEGER, values, piece%extents, ierr, piece%memory_space, run%file_space)
-            else
-               call select_piece(run, piece, error)
-               if (allocated(error)) return
-               mine = values(piece%places)
-               call h5dread_f(dataset, H5T_NATIVE_INTEGER, mine, piece%extents, ierr, piece%memory_space, run%file_space)
-               values(piece%places) = mine
-            end if
-            call check(ierr, 'read the results', error)
-         end associate
+         if (size(run%pieces) > 1) call select_piece(run, i, error)
+         if (allocated(error)) return
+         call h5dread_f(dataset, H5T_NATIVE_INTEGER, values, run%extents, ierr, run%memory_space, run%file_space)
+         call check(ierr, 'read the results', error)
          if (allocated(error)) return
       end do
    end subroutine read_integers
