@@ -94,7 +94,7 @@ def try_spurflex(chosen, spurflex, repeats):
 def run_setting(setting, point, equations, wanted):
     """One full run."""
     if family_of(setting.solver) == "spurflex":
-        return setting.solver.time(point, setting.tolerance, repeats=3)
+        return setting.solver.time(point, setting.tolerance)
     periods = point.periods(wanted)
     return time_peer(setting.solver, equations, setting.tolerance, point, periods, CAP)
 

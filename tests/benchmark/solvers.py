@@ -12,6 +12,7 @@ from peers.model import Model, N
 
 FEW = 8  # mesh periods from which the time of a mesh period is estimated
 START = np.zeros(2 * N)  # static equilibrium
+WARM = 9  # solutions of which the median counts
 
 try:
     from peers import heyoka_peer
@@ -133,8 +134,8 @@ class Spurflex:
             raise RuntimeError(f"{self.program.name}: {len(answers)} answers for {len(points)} points")
         return answers
 
-    def time(self, point, tolerance, repeats=1):
-        """Time one point alone."""
+    def time(self, point, tolerance, repeats=WARM):
+        """Time one point alone: the first solution of a process finds cold caches, the median does not."""
         answer = self.solve([point], tolerance, repeats)[0]
         amplitude = np.nan if answer["amplitude"] is None else answer["amplitude"]
         return Timing(answer["seconds"], amplitude, answer["periods_integrated"], False)

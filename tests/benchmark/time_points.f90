@@ -3,15 +3,17 @@
 !> usage: time_points DECK REPEATS < POINTS
 !>
 !> POINTS has a line `speed support_stiffness` [rev/min, N/m] for every point. The whole list is solved REPEATS times with the
-!> deck's solver, each point from its start (`static` or `rest`). Prints one JSON line a point: `seconds` is the median of the
-!> time of eight copies of the point, which fill the lanes, over eight; `list_seconds` the median time of the whole list at
-!> once over the number of points.
+!> deck's solver, each point from its start (`static` or `rest`), and without Floquet multipliers, for which an amplitude has no
+!> use. Prints one JSON line a point: `seconds` is the median of the time of eight copies of the point, which fill the lanes, over
+!> eight; `list_seconds` the median time of the whole list at once over the number of points. Both count from the start of a
+!> point to its response: equations, modes and tables of the excitation are made in that time.
 program time_points
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use, intrinsic :: iso_fortran_env, only: error_unit, input_unit, int64, output_unit
    use spurflex_base_attendant, only: no_attendant
    use spurflex_base_error, only: error_type
    use spurflex_base_kinds, only: wp
+   use spurflex_external_threads, only: use_one_thread
    use spurflex_integrate_options, only: start_rest
    use spurflex_io_case, only: case_type
    use spurflex_io_deck, only: read_deck
@@ -39,6 +41,8 @@ program time_points
    if (stat /= 0 .or. repeats < 1) call give_up('REPEATS must be a positive integer')
    call read_deck(trim(deck), case, error)
    if (allocated(error)) call give_up(error%message)
+   case%solver%multipliers = .false.
+   call use_one_thread()
    call read_points(points)
 
    allocate (answers(size(points)), seconds(repeats, size(points)), list_seconds(repeats))
