@@ -2,11 +2,12 @@
 !>
 !> usage: time_points DECK REPEATS < POINTS
 !>
-!> POINTS has a line `speed support_stiffness` [rev/min, N/m] for every point. The whole list is solved REPEATS times with the
-!> deck's solver, each point from its start (`static` or `rest`), and without Floquet multipliers, for which an amplitude has no
-!> use. Prints one JSON line a point: `seconds` is the median of the time of eight copies of the point, which fill the lanes, over
-!> eight; `list_seconds` the median time of the whole list at once over the number of points. Both count from the start of a
-!> point to its response: equations, modes and tables of the excitation are made in that time.
+!> POINTS has a line `speed support_stiffness` [rev/min, N/m] for every point. The list is solved with the deck's solver, each
+!> point from its start (`static` or `rest`), and without Floquet multipliers, for which an amplitude has no use. Prints one JSON
+!> line a point: `seconds` is the median of the time of 64 copies of the point, which share lanes and modes as the points of a tile
+!> do, over 64; `list_seconds` the median time of the whole list at once over the number of points. Both count from the start of a
+!> point to its response: equations, modes and tables of the excitation are made in that time. Slow points are solved eight at a
+!> time, and what is slow is repeated less than REPEATS times.
 program time_points
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use, intrinsic :: iso_fortran_env, only: error_unit, input_unit, int64, output_unit
@@ -23,16 +24,21 @@ program time_points
    use spurflex_model_parameters, only: operating_point, support_flexible
    implicit none
 
-   !> Copies of a point that are solved side by side for its time.
-   integer, parameter :: company = 8
+   !> Copies of a point that are solved side by side for its time: as many as share a tile, or as fill the lanes.
+   integer, parameter :: company = 64, lanes = 8
+
+   !> Time for which the copies of a point, and the list, are solved again [s], and the time of a full set of lanes from which on a
+   !> point is slow [s].
+   real(wp), parameter :: patience = 0.5_wp, slow = 0.05_wp
 
    character(len=1024) :: deck, word
    type(case_type) :: case
    type(error_type), allocatable :: error
    type(operating_point), allocatable :: points(:)
    type(response), allocatable :: answers(:)
-   real(wp), allocatable :: seconds(:, :), list_seconds(:)
-   integer :: repeats, repeat, stat, i
+   real(wp), allocatable :: seconds(:)
+   real(wp) :: list_seconds
+   integer :: repeats, stat, i
 
    if (command_argument_count() /= 2) call give_up('usage: time_points DECK REPEATS < POINTS')
    call get_command_argument(1, deck)
@@ -45,12 +51,13 @@ program time_points
    call use_one_thread()
    call read_points(points)
 
-   allocate (answers(size(points)), seconds(repeats, size(points)), list_seconds(repeats))
-   do repeat = 1, repeats
-      call solve_list(case, points, answers, seconds(repeat, :), list_seconds(repeat))
-   end do
+   allocate (answers(size(points)), seconds(size(points)))
    do i = 1, size(points)
-      call print_answer(points(i), answers(i), median(seconds(:, i)), median(list_seconds)/real(size(points), wp))
+      call time_point(case, points(i), repeats, seconds(i))
+   end do
+   call time_list(case, points, repeats, answers, list_seconds)
+   do i = 1, size(points)
+      call print_answer(points(i), answers(i), seconds(i), list_seconds/real(size(points), wp))
    end do
 
 contains
@@ -83,40 +90,82 @@ contains
       end do
    end subroutine read_points
 
-   !> Solve every point of a list once.
-   subroutine solve_list(problem, list, responses, times, total)
+   !> Time a point among copies of itself.
+   subroutine time_point(problem, point, most, seconds)
+      !> Case.
+      type(case_type), intent(in) :: problem
+      !> Point.
+      type(operating_point), intent(in) :: point
+      !> Solutions at most.
+      integer, intent(in) :: most
+      !> Time of one copy [s].
+      real(wp), intent(out) :: seconds
+
+      type(response) :: copies(company)
+      real(wp) :: times(most), first
+      integer :: k
+
+      call solve(problem, spread(point, 1, lanes), copies(:lanes), first)
+      seconds = first/real(lanes, wp)
+      if (first > slow) return
+      do k = 1, most
+         call solve(problem, spread(point, 1, company), copies, times(k))
+         if (sum(times(:k)) > patience) exit
+      end do
+      seconds = median(times(:min(k, most)))/real(company, wp)
+   end subroutine time_point
+
+   !> Time a list that is solved at once.
+   subroutine time_list(problem, list, most, responses, seconds)
+      !> Case.
+      type(case_type), intent(in) :: problem
+      !> Points.
+      type(operating_point), intent(in) :: list(:)
+      !> Solutions at most.
+      integer, intent(in) :: most
+      !> What is found, shape (points).
+      type(response), intent(out) :: responses(:)
+      !> Time [s].
+      real(wp), intent(out) :: seconds
+
+      real(wp) :: times(most)
+      integer :: k
+
+      do k = 1, most
+         call solve(problem, list, responses, times(k))
+         if (sum(times(:k)) > patience) exit
+      end do
+      seconds = median(times(:min(k, most)))
+   end subroutine time_list
+
+   !> Solve points side by side.
+   subroutine solve(problem, list, responses, seconds)
       !> Case.
       type(case_type), intent(in) :: problem
       !> Points.
       type(operating_point), intent(in) :: list(:)
       !> What is found, shape (points).
       type(response), intent(out) :: responses(:)
-      !> Time of every point, shape (points), and of all together [s].
-      real(wp), intent(out) :: times(:), total
+      !> Time [s].
+      real(wp), intent(out) :: seconds
 
       type(solver_type), allocatable :: solver
       type(no_attendant) :: nobody
       type(equations_type) :: equations(size(list))
-      type(response) :: copies(company)
       real(wp), allocatable :: positions(:, :), velocities(:, :)
       real(wp) :: began
       integer :: k
 
+      began = clock()
       allocate (solver)
       call new_solver(problem%solver, solver)
       do k = 1, size(list)
-         began = clock()
          equations(k) = new_equations(problem%gears, problem%box, problem%load, list(k))
-         call set_starts(problem, spread(equations(k), 1, company), positions, velocities)
-         call respond(solver, spread(equations(k), 1, company), positions, velocities, nobody, copies)
-         times(k) = (clock() - began)/real(company, wp)
       end do
-      began = clock()
-      call new_solver(problem%solver, solver)
       call set_starts(problem, equations, positions, velocities)
       call respond(solver, equations, positions, velocities, nobody, responses)
-      total = clock() - began
-   end subroutine solve_list
+      seconds = clock() - began
+   end subroutine solve
 
    !> Where points start.
    subroutine set_starts(problem, equations, positions, velocities)
