@@ -45,7 +45,7 @@ module spurflex_integrate_lane_ensemble
 contains
 
    !> Take points.
-   subroutine load_points(self, equations, modal, part, steps)
+   subroutine load_points(self, equations, modal, part, steps, members)
       !> Ensemble.
       class(lane_ensemble), intent(inout) :: self
       !> Equations of motion of each point, shape (points); all have the same mesh.
@@ -56,9 +56,14 @@ contains
       integer, intent(in) :: part(:)
       !> Steps per mesh period.
       integer, intent(in) :: steps
+      !> Which of them will be seated, one at least; all if not given.
+      integer, intent(in), optional :: members(:)
 
-      integer :: i, modes
+      integer, allocatable :: seated(:)
+      integer :: k, i, modes
 
+      seated = [(i, i=1, size(equations))]
+      if (present(members)) seated = members
       modes = maxval(modal(part)%modes)
       self%seats = lanes
       self%size = 2*modes
@@ -70,8 +75,10 @@ contains
       call new_mesh_cycle(equations(1)%mesh, steps, self%pitch)
       if (allocated(self%rules)) deallocate (self%rules)
       if (allocated(self%weight)) deallocate (self%weight)
-      allocate (self%rules(size(equations)), self%weight(self%size, size(equations)))
-      do i = 1, size(equations)
+      allocate (self%rules(size(equations)))
+      allocate (self%weight(self%size, size(equations)), source=0.0_wp)
+      do k = 1, size(seated)
+         i = seated(k)
          if (self%by_newmark) then
             call new_newmark_rule(modal(part(i)), equations(i), steps, self%rules(i))
          else
@@ -80,10 +87,10 @@ contains
          self%weight(:, i) = widen(modal(part(i))%weight, modes)
       end do
       self%in_use = self%weight > 0.0_wp
-      ! An empty lane follows the first point.
+      ! An empty lane follows the first point that may be seated.
       self%rule%modes = modes
       do i = 1, lanes
-         call load_rule(self%rule, i, self%rules(1))
+         call load_rule(self%rule, i, self%rules(seated(1)))
       end do
    end subroutine load_points
 

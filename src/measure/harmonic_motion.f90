@@ -24,10 +24,10 @@ module spurflex_measure_harmonic_motion
    integer, parameter :: iy1 = 1, ideflection = 6, series_count = 6
    integer, parameter :: ix(2) = [2, 4], iy(2) = [3, 5]
 
-   !> cos(k theta) and sin(k theta) at the samples.
+   !> cos(k theta) and sin(k theta) at the samples of half a period, both ends included; those of the other half mirror them.
    type :: table_type
-      !> Shape (1 + 2 order, samples).
-      real(wp), allocatable :: wave(:, :)
+      !> Shape (0:samples/2, 0:order).
+      real(wp), allocatable :: cosine(:, :), sine(:, :)
    end type table_type
 
    !> Samples series; keeps the tables of the orders met so far.
@@ -52,7 +52,7 @@ contains
       type(response), intent(inout) :: answer
 
       complex(wp) :: lines(0:motion%order, series_count)
-      real(wp) :: seen(series_count, samples_per_order*motion%order), smallest, largest, low, high
+      real(wp) :: seen(samples_per_order*motion%order, series_count), smallest, largest, low, high
       integer :: gear
 
       lines(:, :ideflection - 1) = harmonic_displacements(modal, motion)
@@ -60,17 +60,17 @@ contains
       ! The bearings are measured with their static deformation, y1 without its own.
       lines(0, 2:5) = lines(0, 2:5) + equations%static_observation(2:5)
       call sample(sampler, lines, seen)
-      high = highest(lines(:, iy1:iy1), seen(iy1:iy1, :), 1.0_wp)
-      low = -highest(lines(:, iy1:iy1), seen(iy1:iy1, :), -1.0_wp)
-      largest = highest(lines(:, ideflection:), seen(ideflection:, :), 1.0_wp)
-      smallest = -highest(lines(:, ideflection:), seen(ideflection:, :), -1.0_wp)
+      high = highest(lines(:, iy1:iy1), seen(:, iy1:iy1), 1.0_wp)
+      low = -highest(lines(:, iy1:iy1), seen(:, iy1:iy1), -1.0_wp)
+      largest = highest(lines(:, ideflection:), seen(:, ideflection:), 1.0_wp)
+      smallest = -highest(lines(:, ideflection:), seen(:, ideflection:), -1.0_wp)
       answer%y1_amplitude = 0.5_wp*(high - low)
       answer%y1_rms = sqrt(2.0_wp*sum(abs(lines(1:, iy1))**2))
       answer%y1_max = equations%static_observation(iy1) + high
       answer%y1_min = equations%static_observation(iy1) + low
       do gear = 1, 2
          answer%bearing_deformation_max(gear) = sqrt(max(highest(lines(:, [ix(gear), iy(gear)]), &
-                                                                 seen([ix(gear), iy(gear)], :), 1.0_wp), 0.0_wp))
+                                                                 seen(:, [ix(gear), iy(gear)]), 1.0_wp), 0.0_wp))
       end do
       answer%contact = contact_of(smallest, largest, equations%mesh%half_backlash)
       answer%error_estimate = max(modal%roundoff, motion%left_out)
@@ -82,54 +82,70 @@ contains
       type(series_sampler), intent(inout) :: sampler
       !> Lines, shape (0:order, series).
       complex(wp), intent(in) :: lines(0:, :)
-      !> Values, shape (series, samples).
-      real(wp), intent(out) :: seen(:, :)
+      !> Values, shape (samples, series).
+      real(wp), intent(out) :: seen(0:, :)
 
-      real(wp) :: factor(size(lines, 2), 2*size(lines, 1) - 1)
-      integer :: order, place, samples, k, s
+      real(wp) :: even(0:size(seen, 1)/2), odd(0:size(seen, 1)/2)
+      integer :: order, half, i, k, s
 
       order = ubound(lines, 1)
-      samples = size(seen, 2)
-      place = findloc(orders, order, dim=1)
-      associate (table => sampler%table(place))
-         if (.not. allocated(table%wave)) then
-            allocate (table%wave(1 + 2*order, samples))
-            do s = 1, samples
-               table%wave(1, s) = 1.0_wp
-               do k = 1, order
-                  table%wave(2*k, s) = cos(2.0_wp*pi*real(mod(k*(s - 1), samples), wp)/real(samples, wp))
-                  table%wave(2*k + 1, s) = sin(2.0_wp*pi*real(mod(k*(s - 1), samples), wp)/real(samples, wp))
-               end do
+      half = size(seen, 1)/2
+      associate (table => sampler%table(findloc(orders, order, dim=1)))
+         if (.not. allocated(table%cosine)) call make_table(order, half, table)
+         do i = 1, size(lines, 2)
+            even = real(lines(0, i), wp)
+            odd = 0.0_wp
+            do k = 1, order
+               even = even + 2.0_wp*real(lines(k, i), wp)*table%cosine(:, k)
+               odd = odd - 2.0_wp*aimag(lines(k, i))*table%sine(:, k)
             end do
-         end if
-         factor(:, 1) = real(lines(0, :), wp)
-         do k = 1, order
-            factor(:, 2*k) = 2.0_wp*real(lines(k, :), wp)
-            factor(:, 2*k + 1) = -2.0_wp*aimag(lines(k, :))
+            do s = 0, half - 1
+               seen(s, i) = even(s) + odd(s)
+               seen(half + s, i) = even(half - s) - odd(half - s)
+            end do
          end do
-         seen = matmul(factor, table%wave)
       end associate
    end subroutine sample
+
+   !> Make the table of an order.
+   pure subroutine make_table(order, half, table)
+      !> Order, and half the number of samples.
+      integer, intent(in) :: order, half
+      !> The table.
+      type(table_type), intent(inout) :: table
+
+      real(wp) :: phase
+      integer :: k, s
+
+      allocate (table%cosine(0:half, 0:order), table%sine(0:half, 0:order))
+      do k = 0, order
+         do s = 0, half
+            phase = pi*real(mod(k*s, 2*half), wp)/real(half, wp)
+            table%cosine(s, k) = cos(phase)
+            table%sine(s, k) = sin(phase)
+         end do
+      end do
+   end subroutine make_table
 
    !> The largest value of a series, or of the sum of the squares of two.
    pure function highest(lines, seen, sign_of) result(value)
       !> Lines of the series, shape (0:order, 1 or 2).
       complex(wp), intent(in) :: lines(0:, :)
-      !> Samples, shape (1 or 2, samples).
+      !> Samples, shape (samples, 1 or 2).
       real(wp), intent(in) :: seen(:, :)
       !> 1, or -1 for the largest of the negative.
       real(wp), intent(in) :: sign_of
       !> The value.
       real(wp) :: value
 
-      real(wp) :: height(0:size(seen, 2) + 1), left, right, bend, top, margin
+      real(wp) :: height(0:size(seen, 1) + 1), left, right, bend, top, margin
       integer :: s, n
 
-      n = size(seen, 2)
-      if (size(seen, 1) == 1) then
-         height(1:n) = sign_of*seen(1, :)
+      n = size(seen, 1)
+      if (size(seen, 2) == 1) then
+         height(1:n) = sign_of*seen(:, 1)
       else
-         height(1:n) = sign_of*(seen(1, :)**2 + seen(2, :)**2)
+         height(1:n) = sign_of*(seen(:, 1)**2 + seen(:, 2)**2)
       end if
       height(0) = height(n)
       height(n + 1) = height(1)

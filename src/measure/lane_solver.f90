@@ -26,6 +26,9 @@ module spurflex_measure_lane_solver
 
    public :: lane_solver, forget_parts, find_part, measure_orbits, measure_windows
 
+   !> Share of the tolerance by which the judge's orbit may be off: it is only to tell how far the other is.
+   real(wp), parameter :: judge_share = 0.01_wp
+
    !> Linear parts that are kept for tiles to come; a few kilobytes each.
    integer, parameter :: most_parts = 256
 
@@ -139,7 +142,7 @@ contains
          agreed(group) = .true.
          if (next /= solver%points%steps .or. (solver%by_newmark() .neqv. solver%points%by_newmark)) then
             solver%points%by_newmark = solver%by_newmark()
-            call solver%points%load(equations, solver%modal, part, next)
+            call solver%points%load(equations, solver%modal, part, next, group)
          end if
          if (any(found_by(group) /= next)) call find_again(solver, group, visitor, motions, orbits, agreed)
          call judge_orbits(solver, equations, part, pack(group, agreed(group)), visitor, motions, orbits, answers, agreed)
@@ -248,7 +251,7 @@ contains
       logical :: found(size(members))
 
       if (size(members) == 0) return
-      call load_judge(solver, equations, part)
+      call load_judge(solver, equations, part, members)
       measured = answers(members)
       judgement = answers(members)
       judged = orbits(members)
@@ -258,7 +261,7 @@ contains
       call measure_lanes(solver%points, equations, solver%views, part, solver%view, members, judged%periods, visitor, states, &
                          measured)
       call find_orbits(solver%judge, members, sizes(solver%points, members, judged), visitor, judged, found, &
-                       monodromy_is_near=.true., roughly=.true.)
+                       monodromy_is_near=.true., roughly=.true., near_enough=judge_share*solver%options%tolerance)
       ! Large steps can split a motion in two where the teeth graze.
       call reduce_periods(solver%judge, members, found, visitor, judged)
       found = found .and. judged%periods == orbits(members)%periods
@@ -277,16 +280,19 @@ contains
    end subroutine judge_orbits
 
    !> Load the judge, which collocates with more than twice the steps.
-   subroutine load_judge(solver, equations, part)
+   subroutine load_judge(solver, equations, part, members)
       !> Solver, its points loaded.
       type(lane_solver), intent(inout) :: solver
       !> Equations of motion of each point, shape (n).
       type(equations_type), intent(in) :: equations(:)
       !> Linear part of each point, shape (n).
       integer, intent(in) :: part(:)
+      !> Which of them will be judged.
+      integer, intent(in) :: members(:)
 
       ! One more than twice as many: where the grids nest, a crossing can leave both with the same part of a step behind it.
-      call solver%judge%load(equations, solver%modal, part, 2*merge(solver%steps, solver%points%steps, solver%by_newmark()) + 1)
+      call solver%judge%load(equations, solver%modal, part, &
+                             2*merge(solver%steps, solver%points%steps, solver%by_newmark()) + 1, members)
    end subroutine load_judge
 
    !> Sizes of motions.
@@ -337,7 +343,7 @@ contains
          if (any(steps(members(:i - 1)) == steps(members(i)))) cycle
          solver%points%by_newmark = solver%by_newmark()
          call solver%points%load(equations, solver%modal, part, steps(members(i)))
-         call load_judge(solver, equations, part)
+         call load_judge(solver, equations, part, members)
          call measure_group(pack(members, steps(members) == steps(members(i))))
       end do
       ! What is not finite may have had too few steps.

@@ -28,6 +28,13 @@ module spurflex_steady_harmonic
    !> What the lines left out may give to the mesh deflection, beside its largest line.
    real(wp), parameter :: negligible = 1.0e-14_wp
 
+   !> Frequency responses of modes: P = 1/(i k w - lambda_j) and Q = 1/(i k w - conj(lambda_j)) as P + Q and i (P - Q). A real part
+   !> of f z_j, driven by N_k, is -N_k [Re f (P + Q) + Im f (i (P - Q))]/2.
+   type :: mode_lines
+      !> P + Q and i (P - Q), shape (0:order, modes) [s].
+      complex(wp), allocatable :: total(:, :), turned(:, :)
+   end type mode_lines
+
    !> The series of one point.
    type :: harmonic_motion
       !> Highest order, in multiples of the mesh frequency; 0 where no series converged.
@@ -39,6 +46,8 @@ module spurflex_steady_harmonic
       complex(wp), allocatable :: deflection(:), force(:)
       !> What the lines left out give to the mesh deflection, beside its largest line [-].
       real(wp) :: left_out = 0.0_wp
+      !> Frequency responses of every mode, with those of the lines left out, shape (0:order and more, modes) [s].
+      type(mode_lines), private :: modes
    end type harmonic_motion
 
 contains
@@ -79,7 +88,7 @@ contains
       !> There is one.
       logical, intent(out) :: found
 
-      complex(wp) :: compliance(0:motion%order + size(equations%mesh%stiffness_coefficients))
+      complex(wp), dimension(0:motion%order + size(equations%mesh%stiffness_coefficients)) :: compliance
       complex(wp), dimension(0:motion%order) :: stiffness, tooth_error, drive
       complex(wp) :: band(3*size(equations%mesh%stiffness_coefficients) + 1, -motion%order:motion%order)
       complex(wp) :: x(-motion%order:motion%order)
@@ -88,7 +97,8 @@ contains
 
       n = motion%order
       h = size(equations%mesh%stiffness_coefficients)
-      compliance = lines_of(modal, modal%influence, motion%frequency, n + h)
+      call set_modes(modal, motion%frequency, n + h, motion%modes)
+      compliance = lines_of(motion%modes, modal%influence, n + h)
       call set_excitation(equations, n, stiffness, tooth_error, drive)
       band = (0.0_wp, 0.0_wp)
       do k = -n, n
@@ -161,40 +171,59 @@ contains
       end associate
    end subroutine set_excitation
 
-   !> Frequency response to N of what is the real part of a sum over the modes, without its sign:
-   !> sum_j [f_j/(i k w - lambda_j) + conj(f_j)/(i k w - conj(lambda_j))]/2.
-   pure function lines_of(modal, factor, frequency, order) result(lines)
+   !> Find the frequency responses of the modes.
+   pure subroutine set_modes(modal, frequency, order, modes)
       !> Modes.
       type(modal_system), intent(in) :: modal
-      !> f: what a mode is driven with, times what it counts for, shape (modes).
-      complex(wp), intent(in) :: factor(:)
       !> Mesh frequency w [rad/s].
       real(wp), intent(in) :: frequency
+      !> Highest order k.
+      integer, intent(in) :: order
+      !> The responses.
+      type(mode_lines), intent(inout) :: modes
+
+      real(wp), dimension(0:order) :: below, above, first, second
+      real(wp) :: a
+      integer :: j, k
+
+      if (allocated(modes%total)) deallocate (modes%total, modes%turned)
+      allocate (modes%total(0:order, modal%modes), modes%turned(0:order, modal%modes))
+      do j = 1, modal%modes
+         a = -real(modal%rate(j), wp)
+         do k = 0, order
+            below(k) = real(k, wp)*frequency - aimag(modal%rate(j))
+            above(k) = real(k, wp)*frequency + aimag(modal%rate(j))
+            first(k) = 1.0_wp/(a*a + below(k)*below(k))
+            second(k) = 1.0_wp/(a*a + above(k)*above(k))
+         end do
+         do k = 0, order
+            modes%total(k, j) = cmplx(a*(first(k) + second(k)), -(below(k)*first(k) + above(k)*second(k)), wp)
+            modes%turned(k, j) = cmplx(below(k)*first(k) - above(k)*second(k), a*(first(k) - second(k)), wp)
+         end do
+      end do
+   end subroutine set_modes
+
+   !> Frequency response to N of what is the real part of a sum over the modes, without its sign:
+   !> sum_j [f_j/(i k w - lambda_j) + conj(f_j)/(i k w - conj(lambda_j))]/2.
+   pure function lines_of(modes, factor, order) result(lines)
+      !> Responses of the modes.
+      type(mode_lines), intent(in) :: modes
+      !> f: what a mode is driven with, times what it counts for, shape (modes).
+      complex(wp), intent(in) :: factor(:)
       !> Highest order k.
       integer, intent(in) :: order
       !> The response, shape (0:order).
       complex(wp) :: lines(0:order)
 
-      real(wp), dimension(0:order) :: re, im
-      real(wp) :: a, above, below, first, second, p, q
-      integer :: j, k
+      real(wp) :: p, q
+      integer :: j
 
-      re = 0.0_wp
-      im = 0.0_wp
-      do j = 1, modal%modes
-         a = -real(modal%rate(j), wp)
+      lines = (0.0_wp, 0.0_wp)
+      do j = 1, size(factor)
          p = 0.5_wp*real(factor(j), wp)
          q = 0.5_wp*aimag(factor(j))
-         do k = 0, order
-            below = real(k, wp)*frequency - aimag(modal%rate(j))
-            above = real(k, wp)*frequency + aimag(modal%rate(j))
-            first = 1.0_wp/(a*a + below*below)
-            second = 1.0_wp/(a*a + above*above)
-            re(k) = re(k) + first*(p*a + q*below) + second*(p*a - q*above)
-            im(k) = im(k) + first*(q*a - p*below) - second*(q*a + p*above)
-         end do
+         lines = lines + p*modes%total(0:order, j) + q*modes%turned(0:order, j)
       end do
-      lines = cmplx(re, im, wp)
    end function lines_of
 
    !> State of the modes at the section, where the mesh period begins.
@@ -206,18 +235,19 @@ contains
       !> Real parts, then imaginary parts, shape (2 modes).
       real(wp) :: state(2*modal%modes)
 
-      complex(wp), parameter :: i = (0.0_wp, 1.0_wp)
       complex(wp) :: z
-      real(wp) :: w
+      real(wp) :: re, im
       integer :: j, k
 
       do j = 1, modal%modes
-         z = -motion%force(0)/modal%rate(j)
+         ! Orders k and -k together: N_k P + conj(N_k Q).
+         re = 0.5_wp*real(motion%force(0)*motion%modes%total(0, j), wp)
+         im = -0.5_wp*real(motion%force(0)*motion%modes%turned(0, j), wp)
          do k = 1, motion%order
-            w = real(k, wp)*motion%frequency
-            z = z + motion%force(k)/(i*w - modal%rate(j)) + conjg(motion%force(k))/(-i*w - modal%rate(j))
+            re = re + real(motion%force(k)*motion%modes%total(k, j), wp)
+            im = im - real(motion%force(k)*motion%modes%turned(k, j), wp)
          end do
-         z = -modal%influence(j)*z
+         z = -modal%influence(j)*cmplx(re, im, wp)
          state(j) = real(z, wp)
          state(modal%modes + j) = merge(0.0_wp, aimag(z), modal%is_real(j))
       end do
@@ -235,7 +265,7 @@ contains
       integer :: i
 
       do i = 1, size(modal%observation, 1)
-         lines(:, i) = -motion%force*lines_of(modal, modal%observation(i, :)*modal%influence, motion%frequency, motion%order)
+         lines(:, i) = -motion%force*lines_of(motion%modes, modal%observation(i, :)*modal%influence, motion%order)
       end do
    end function harmonic_displacements
 

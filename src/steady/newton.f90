@@ -8,7 +8,7 @@ module spurflex_steady_newton
    implicit none
    private
 
-   public :: newton_item, newton_steps, end_pass, pass_none, pass_linear, pass_near, pass_look
+   public :: newton_item, newton_steps, end_pass, pass_none, pass_linear, pass_near, pass_look, converged_step
 
    !> Newton iterations at most; an affine map needs one, a change of the contact pattern a few more.
    integer, parameter :: most_iterations = 12
@@ -57,7 +57,7 @@ module spurflex_steady_newton
 contains
 
    !> A period of the motion has passed: take a Newton step, and decide whether the motion is found or given up.
-   subroutine end_pass(weight, half_backlash, scale, step, only_affine, roughly, item, orbit, found)
+   subroutine end_pass(weight, half_backlash, scale, step, only_affine, roughly, near_enough, item, orbit, found)
       !> Weights of the states, shape (size).
       real(wp), intent(in) :: weight(:)
       !> Half of the backlash [m].
@@ -70,6 +70,8 @@ contains
       logical, intent(in) :: only_affine
       !> The monodromy may be that of a state nearby.
       logical, intent(in) :: roughly
+      !> What may be left of the distance to the motion, beside its size.
+      real(wp), intent(in) :: near_enough
       !> Newton's method; it waits for nothing more where the motion is found or given up.
       type(newton_item), intent(inout) :: item
       !> The motion.
@@ -108,10 +110,12 @@ contains
       if (item%iteration > free .and. item%length > max(least_shrinkage*previous, stagnant_step*scale)) return
       orbit%state = orbit%state + step
       orbit%last_step = item%length
-      found = item%length <= converged_step*scale .or. (item%length <= stagnant_step*scale .and. item%length > 0.25_wp*previous)
+      found = item%length <= near_enough*scale .or. (item%length <= stagnant_step*scale .and. item%length > 0.25_wp*previous)
       if (previous < huge(1.0_wp) .and. item%length <= min(trusted_step*scale, fast_shrinkage*previous)) then
-         found = found .or. item%length*(item%length/previous) <= converged_step*scale
+         found = found .or. item%length*(item%length/previous) <= near_enough*scale
       end if
+      ! A step with a monodromy that is near leaves no more than the next one would have to be.
+      if (pass == pass_near) found = found .or. near_shrinkage*item%length <= near_enough*scale
       if (found .or. item%iteration == most_iterations) return
       item%pass = pass
       if (roughly .and. pass == pass_linear .and. item%length <= near_step*scale) item%pass = pass_near

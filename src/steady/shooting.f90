@@ -7,7 +7,8 @@ module spurflex_steady_shooting
    use spurflex_base_kinds, only: wp
    use spurflex_integrate_ensemble, only: ensemble, solo_ensemble, new_solo
    use spurflex_integrate_period_map, only: period_map
-   use spurflex_steady_newton, only: newton_item, newton_steps, end_pass, pass_none, pass_linear, pass_near, pass_look
+   use spurflex_steady_newton, only: newton_item, newton_steps, end_pass, pass_none, pass_linear, pass_near, pass_look, &
+      converged_step
    use spurflex_steady_orbit, only: periodic_orbit
    implicit none
    private
@@ -20,6 +21,8 @@ module spurflex_steady_shooting
       type(newton_item), allocatable :: items(:)
       !> Give up where contact is lost; the monodromy may be that of a state nearby.
       logical :: only_affine = .false., roughly = .false.
+      !> What may be left of the distance to a motion, beside its size.
+      real(wp) :: near_enough = converged_step
    end type newton_type
 
 contains
@@ -83,7 +86,8 @@ contains
    !> Find periodic motions of several points, each near a state.
    !>
    !> Passes with tangents and passes without take turns, so that no lane carries tangents that it does not need.
-   subroutine find_orbits(points, members, scale, visitor, orbits, found, only_affine, monodromy_is_near, roughly)
+   subroutine find_orbits(points, members, scale, visitor, orbits, found, only_affine, monodromy_is_near, roughly, &
+                          near_enough)
       !> The points.
       class(ensemble), intent(inout) :: points
       !> Which of them, shape (n).
@@ -102,11 +106,14 @@ contains
       logical, intent(in), optional :: monodromy_is_near
       !> The monodromy may be that of a state nearby, `near_step` away at most.
       logical, intent(in), optional :: roughly
+      !> What may be left of the distance to a motion, beside its size, if that is more than Newton's method leaves.
+      real(wp), intent(in), optional :: near_enough
 
       type(newton_type) :: newton
 
       allocate (newton%items(size(members)))
       if (present(roughly)) newton%roughly = roughly
+      if (present(near_enough)) newton%near_enough = max(near_enough, converged_step)
       if (present(only_affine)) newton%only_affine = only_affine
       if (newton%only_affine) newton%items%pass = pass_look
       if (present(monodromy_is_near)) then
@@ -182,7 +189,7 @@ contains
             if (.not. ends(k)) cycle
             associate (p => seated(k))
                call end_pass(points%weight(:, members(p)), points%half_backlash, scale(p), states(k, :), newton%only_affine, &
-                             newton%roughly, newton%items(p), orbits(p), found(p))
+                             newton%roughly, newton%near_enough, newton%items(p), orbits(p), found(p))
             end associate
             if (runs(newton%items(seated(k)), with_tangents)) then
                call begin_pass(seated(k))
