@@ -11,6 +11,7 @@ module spurflex_measure_lane_solver
    use spurflex_measure_harmonic_motion, only: series_sampler
    use spurflex_measure_lane_motion, only: measure_lanes, quarter_of, parts, begin_of_window, first_half, second_half
    use spurflex_measure_linear_points, only: harmonics_do, measure_linear
+   use spurflex_measure_point, only: judge_share
    use spurflex_measure_response, only: response, empty_response, describe_motion, relative_difference, status_inaccurate, &
       reason_given_steps
    use spurflex_model_equations, only: equations_type
@@ -25,9 +26,6 @@ module spurflex_measure_lane_solver
    private
 
    public :: lane_solver, forget_parts, find_part, measure_orbits, measure_windows
-
-   !> Share of the tolerance by which the judge's orbit may be off: it is only to tell how far the other is.
-   real(wp), parameter :: judge_share = 0.01_wp
 
    !> Linear parts that are kept for tiles to come; a few kilobytes each.
    integer, parameter :: most_parts = 256

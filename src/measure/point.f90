@@ -25,11 +25,14 @@ module spurflex_measure_point
    use spurflex_steady_sections, only: weighted_norm
    use spurflex_steady_orbit, only: periodic_orbit
    use spurflex_steady_shooting, only: find_orbit
-   use spurflex_steady_stability, only: find_stable_orbits
+   use spurflex_steady_stability, only: find_stable_orbits, reduce_periods
    implicit none
    private
 
-   public :: point_solver, new_point_solver, respond_alone
+   public :: point_solver, new_point_solver, respond_alone, judge_share
+
+   !> Share of the tolerance by which the judge's orbit may be off: it is only to tell how far the other is.
+   real(wp), parameter :: judge_share = 0.01_wp
 
    !> What solves points one after the other; keeps what the next point can use again.
    type :: point_solver
@@ -57,7 +60,8 @@ contains
    end subroutine new_point_solver
 
    !> The response of one point. A point that fails is a status in the response, not an error.
-   subroutine respond_alone(solver, equations, start_position, start_velocity, position, velocity, visitor, motion, answer)
+   subroutine respond_alone(solver, equations, start_position, start_velocity, position, velocity, visitor, motion, monodromy, &
+                            answer)
       !> Solver.
       type(point_solver), intent(inout) :: solver
       !> Equations of motion of the point.
@@ -70,6 +74,9 @@ contains
       class(attendant), intent(inout) :: visitor
       !> The motion, with the status `status_missing` if it is not known.
       type(steady_motion), intent(inout) :: motion
+      !> Derivative of the map over the period of a known motion in its modes, near enough for Newton's method, shape
+      !> (2 modes, 2 modes); not allocated if there is none.
+      real(wp), allocatable, intent(inout) :: monodromy(:, :)
       !> The response.
       type(response), intent(out) :: answer
 
@@ -98,7 +105,7 @@ contains
          call solver%map%load(equations, steps, error)
          if (allocated(error)) return
          if (known .and. motion%periods > 0) then
-            call follow_motion(solver%map, position, velocity, visitor, solver%options, motion, found)
+            call follow_motion(solver%map, position, velocity, visitor, solver%options, motion, monodromy, found)
             if (is_free .and. .not. found .and. steps < most_steps) then
                steps = better_steps(steps, 1.0_wp, solver%options)
                cycle
@@ -107,8 +114,11 @@ contains
          else if (known) then
             motion%state = solver%map%to_state(position, velocity)
          end if
-         if (.not. known) call find_steady_motion(solver%map, solver%map%to_state(start_position, start_velocity), &
-                                                  solver%options, visitor, motion)
+         if (.not. known) then
+            if (allocated(monodromy)) deallocate (monodromy)
+            call find_steady_motion(solver%map, solver%map%to_state(start_position, start_velocity), solver%options, visitor, &
+                                    motion)
+         end if
          call describe_motion(motion, answer)
          if (motion%status == status_diverged) return
          if (motion%periods == 0) then
@@ -125,7 +135,8 @@ contains
          end if
          call measure_periods(solver%map, motion%periods, motion%state, equations, solver%orbit, answer)
          call solver%map%from_state(motion%state, position, velocity)
-         call judge_motion(solver, equations, position, velocity, motion%periods, visitor, answer, agreed)
+         call judge_motion(solver, equations, position, velocity, motion%periods, visitor, monodromy, answer, &
+                           agreed)
          if (agreed) accurate = answer%error_estimate <= solver%options%tolerance
          if (accurate .or. solver%options%steps_per_period > 0 .or. steps >= most_steps) exit
          steps = better_steps(steps, merge(answer%error_estimate, 1.0_wp, agreed), solver%options)
@@ -142,7 +153,7 @@ contains
    end subroutine respond_alone
 
    !> Find a motion again, near where it was with larger steps; it must still be stable and take as long.
-   subroutine follow_motion(map, position, velocity, visitor, options, motion, found)
+   subroutine follow_motion(map, position, velocity, visitor, options, motion, monodromy, found)
       !> Period map with the smaller steps.
       class(period_map), intent(inout), target :: map
       !> Section of the motion with the larger ones, shape (n).
@@ -153,24 +164,50 @@ contains
       type(solver_options), intent(in) :: options
       !> The motion.
       type(steady_motion), intent(inout) :: motion
+      !> Monodromy with the larger steps, in the modes, if it is known; that with the smaller ones where it had to be found.
+      real(wp), allocatable, intent(inout) :: monodromy(:, :)
       !> It is there.
       logical, intent(out) :: found
 
       type(solo_ensemble) :: solo
       type(periodic_orbit) :: orbit(1)
+      real(wp) :: state(map%size), scale
+      integer :: integrated
       logical :: is_found(1)
 
       call new_solo(map, solo)
-      orbit(1)%state = map%to_state(position, velocity)
-      orbit(1)%periods = motion%periods
-      call find_stable_orbits(solo, [1], [size_of(map, orbit(1)%state)], visitor, orbit, is_found)
-      motion%periods_integrated = motion%periods_integrated + orbit(1)%integrated
+      state = map%to_state(position, velocity)
+      scale = size_of(map, state)
+      integrated = 0
+      select type (map)
+      type is (collocation_map)
+         ! A motion that is stable with larger steps, and is found where its linearised map leads, is stable.
+         if (allocated(monodromy)) then
+            call find_orbit(map, state, motion%periods, scale, visitor, orbit(1), is_found(1), monodromy)
+            call reduce_periods(solo, [1], is_found, visitor, orbit)
+            integrated = orbit(1)%integrated
+            if (is_found(1)) state = orbit(1)%state
+         end if
+      end select
+      if (options%multipliers .or. .not. orbit(1)%given .or. .not. is_found(1)) then
+         orbit(1)%state = state
+         orbit(1)%periods = motion%periods
+         call find_stable_orbits(solo, [1], [scale], visitor, orbit, is_found)
+      else
+         orbit(1)%integrated = 0
+      end if
+      motion%periods_integrated = motion%periods_integrated + integrated + orbit(1)%integrated
       found = is_found(1) .and. orbit(1)%periods == motion%periods
-      if (found) call describe_orbit(orbit(1), options, motion)
+      if (.not. found) return
+      call describe_orbit(orbit(1), options, motion)
+      select type (map)
+      type is (collocation_map)
+         monodromy = orbit(1)%monodromy
+      end select
    end subroutine follow_motion
 
    !> Find and measure a motion with the judging integrator; the difference is the error estimate.
-   subroutine judge_motion(solver, equations, position, velocity, periods, visitor, answer, agreed)
+   subroutine judge_motion(solver, equations, position, velocity, periods, visitor, monodromy, answer, agreed)
       !> Solver.
       type(point_solver), intent(inout) :: solver
       !> Equations of motion of the point.
@@ -181,6 +218,8 @@ contains
       integer, intent(in) :: periods
       !> Let in now and then.
       class(attendant), intent(inout) :: visitor
+      !> Monodromy of the motion in its modes, if it is known.
+      real(wp), allocatable, intent(in) :: monodromy(:, :)
       !> The response, whose error estimate is filled in.
       type(response), intent(inout) :: answer
       !> The judge finds the motion too.
@@ -192,7 +231,8 @@ contains
 
       call load_judge(solver, equations, position, velocity, state, agreed)
       if (.not. agreed) return
-      call find_orbit(solver%judge, state, periods, size_of(solver%judge, state), visitor, orbit, agreed)
+      call find_orbit(solver%judge, state, periods, size_of(solver%judge, state), visitor, orbit, agreed, monodromy, &
+                      judge_share*solver%options%tolerance)
       answer%periods_integrated = answer%periods_integrated + orbit%integrated
       if (.not. agreed) return
       judged = empty_response()

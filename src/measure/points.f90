@@ -92,6 +92,7 @@ contains
       integer :: steps(size(equations)), part(size(equations)), i, k
       integer, allocatable :: group(:)
       logical :: done(size(equations))
+      type(periodic_orbit) :: orbits(size(equations))
 
       done = .false.
       start_positions = positions
@@ -110,7 +111,7 @@ contains
             ! Given as an argument, `equations(group)` would be a copy whose components gfortran never frees.
             chosen = equations(group)
             call respond_in_lanes(solver%lanes, chosen, part(group), steps(i), positions, velocities, group, visitor, &
-                                  solver%effort, motions, answers, done)
+                                  solver%effort, motions, orbits, answers, done)
          end do
       end if
       solver%effort%steps = solver%lanes%points%steps_done + solver%lanes%judge%steps_done
@@ -123,7 +124,7 @@ contains
          position = positions(:, i)
          velocity = velocities(:, i)
          call respond_alone(solver%alone, equations(i), start_positions(:, i), start_velocities(:, i), position, velocity, &
-                            visitor, motions(i), answers(i))
+                            visitor, motions(i), orbits(i)%monodromy, answers(i))
          positions(:, i) = position
          velocities(:, i) = velocity
          call solver%effort%end(stage_alone)
@@ -154,7 +155,7 @@ contains
 
    !> Find motions in lanes, and measure them there as far as lanes meet the tolerance.
    subroutine respond_in_lanes(solver, equations, part, steps, positions, velocities, group, visitor, effort, motions, &
-                               answers, done)
+                               orbits, answers, done)
       !> Solver.
       type(lane_solver), intent(inout) :: solver
       !> Equations of motion of each point of the group, shape (n).
@@ -173,17 +174,20 @@ contains
       type(effort_type), intent(inout) :: effort
       !> Motion of every point; its status remains `status_missing` if it must be found by other means.
       type(steady_motion), intent(inout) :: motions(:)
+      !> Orbit of every point that is periodic and not complete, in its own modes.
+      type(periodic_orbit), intent(inout) :: orbits(:)
       !> Response of every point.
       type(response), intent(inout) :: answers(:)
       !> The response of every point is complete.
       logical, intent(inout) :: done(:)
 
       type(steady_motion) :: found(size(group))
-      type(periodic_orbit) :: orbits(size(group))
+      type(periodic_orbit) :: near(size(group))
       type(response) :: measured(size(group))
       real(wp), allocatable :: starts(:, :), position(:), velocity(:)
+      integer, allocatable :: own(:)
       logical :: complete(size(group))
-      integer :: i
+      integer :: i, k
 
       call effort%begin()
       ! Steps that are given choose the motion too; free ones are chosen to measure it, and collocation finds it.
@@ -196,14 +200,14 @@ contains
          starts(:, i) = widen(to_modes(solver%modal(part(i)), positions(:, group(i)), velocities(:, group(i))), &
                               solver%points%size/2)
       end do
-      call find_steady_motions(solver%points, starts, solver%options, visitor, found, orbits)
+      call find_steady_motions(solver%points, starts, solver%options, visitor, found, near)
       call effort%end(stage_search)
       complete = .false.
       measured = empty_response()
       if (solver%options%integrator == integrator_collocation .or. is_average(solver%options)) then
          call measure_windows(solver, equations, part, pack([(i, i=1, size(group))], found%status /= status_diverged &
                                                       .and. found%periods == 0), visitor, found, measured, complete)
-         call measure_orbits(solver, equations, part, pack([(i, i=1, size(group))], found%periods > 0), visitor, found, orbits, &
+         call measure_orbits(solver, equations, part, pack([(i, i=1, size(group))], found%periods > 0), visitor, found, near, &
                              measured, complete)
       end if
       call effort%end(stage_measure)
@@ -218,6 +222,10 @@ contains
          motions(group(i)) = found(i)
          done(group(i)) = complete(i)
          if (complete(i)) answers(group(i)) = measured(i)
+         if (complete(i) .or. found(i)%periods == 0) cycle
+         own = [(k, k=1, solver%modal(part(i))%modes)]
+         own = [own, solver%points%size/2 + own]
+         orbits(group(i))%monodromy = near(i)%monodromy(own, own)
       end do
    end subroutine respond_in_lanes
 

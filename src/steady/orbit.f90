@@ -16,6 +16,8 @@ module spurflex_steady_orbit
       real(wp), allocatable :: state(:)
       !> Derivative of the map over its period, shape (size, size).
       real(wp), allocatable :: monodromy(:, :)
+      !> The monodromy is one that was given, of a motion nearby.
+      logical :: given = .false.
       !> Weighted length of the last Newton step [m].
       real(wp) :: last_step = 0.0_wp
       !> Extremes of the mesh deflection over its period [m].
@@ -34,6 +36,7 @@ contains
       type(periodic_orbit), intent(inout) :: to
 
       to%periods = from%periods
+      to%given = from%given
       to%last_step = from%last_step
       to%smallest = from%smallest
       to%largest = from%largest

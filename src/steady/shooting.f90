@@ -55,7 +55,7 @@ contains
    end subroutine advance_periods
 
    !> Find a periodic motion near a state.
-   subroutine find_orbit(map, start, periods, scale, visitor, orbit, found)
+   subroutine find_orbit(map, start, periods, scale, visitor, orbit, found, monodromy, near_enough)
       !> Period map at an operating point.
       class(period_map), intent(inout), target :: map
       !> State near the motion, shape (size).
@@ -70,6 +70,10 @@ contains
       type(periodic_orbit), intent(out) :: orbit
       !> There is one.
       logical, intent(out) :: found
+      !> A monodromy that is nearly that of the motion, to be tried first, shape (size, size).
+      real(wp), intent(in), optional :: monodromy(:, :)
+      !> What may be left of the distance to the motion, beside its size, if that is more than Newton's method leaves.
+      real(wp), intent(in), optional :: near_enough
 
       type(solo_ensemble) :: solo
       type(periodic_orbit) :: orbits(1)
@@ -78,7 +82,9 @@ contains
       call new_solo(map, solo)
       orbits(1)%periods = periods
       orbits(1)%state = start
-      call find_orbits(solo, [1], [scale], visitor, orbits, is_found)
+      if (present(monodromy)) orbits(1)%monodromy = monodromy
+      call find_orbits(solo, [1], [scale], visitor, orbits, is_found, monodromy_is_near=present(monodromy), &
+                       roughly=present(monodromy), near_enough=near_enough)
       orbit = orbits(1)
       found = is_found(1)
    end subroutine find_orbit
@@ -116,9 +122,9 @@ contains
       if (present(near_enough)) newton%near_enough = max(near_enough, converged_step)
       if (present(only_affine)) newton%only_affine = only_affine
       if (newton%only_affine) newton%items%pass = pass_look
-      if (present(monodromy_is_near)) then
-         if (monodromy_is_near) newton%items%pass = pass_near
-      end if
+      orbits%given = .false.
+      if (present(monodromy_is_near)) orbits%given = monodromy_is_near
+      where (orbits%given) newton%items%pass = pass_near
       orbits%integrated = 0
       found = .false.
       do while (any(newton%items%pass /= pass_none))
@@ -181,7 +187,9 @@ contains
                item%high = max(item%high, points%largest(k))
                item%done = item%done + 1
                ends(k) = item%done >= orbits(seated(k))%periods
-               if (ends(k) .and. with_tangents) orbits(seated(k))%monodromy = transpose(tangents(k, :, :))
+               if (.not. (ends(k) .and. with_tangents)) cycle
+               orbits(seated(k))%monodromy = transpose(tangents(k, :, :))
+               orbits(seated(k))%given = .false.
             end associate
          end do
          call newton_steps(points%size, seated, ends, newton%items, orbits, states)
