@@ -21,7 +21,7 @@ module spurflex_measure_lane_solver
    use spurflex_steady_sections, only: weighted_norm
    use spurflex_steady_orbit, only: periodic_orbit
    use spurflex_steady_shooting, only: find_orbits
-   use spurflex_steady_stability, only: find_stable_orbits, reduce_periods
+   use spurflex_steady_stability, only: follow_orbits, reduce_periods
    implicit none
    private
 
@@ -208,8 +208,8 @@ contains
       integer :: i
 
       again = orbits(members)
-      call find_stable_orbits(solver%points, members, sizes(solver%points, members, again), visitor, again, is_found, &
-                              roughly=.not. solver%options%multipliers)
+      call follow_orbits(solver%points, members, sizes(solver%points, members, again), visitor, again, is_found, &
+                         renew=solver%options%multipliers)
       do i = 1, size(members)
          associate (motion => motions(members(i)))
             motion%periods_integrated = motion%periods_integrated + again(i)%integrated

@@ -25,7 +25,7 @@ module spurflex_measure_point
    use spurflex_steady_sections, only: weighted_norm
    use spurflex_steady_orbit, only: periodic_orbit
    use spurflex_steady_shooting, only: find_orbit
-   use spurflex_steady_stability, only: find_stable_orbits, reduce_periods
+   use spurflex_steady_stability, only: find_stable_orbits, follow_orbits
    implicit none
    private
 
@@ -171,39 +171,29 @@ contains
 
       type(solo_ensemble) :: solo
       type(periodic_orbit) :: orbit(1)
-      real(wp) :: state(map%size), scale
-      integer :: integrated
-      logical :: is_found(1)
+      real(wp) :: scale(1)
+      logical :: is_found(1), is_modal
 
       call new_solo(map, solo)
-      state = map%to_state(position, velocity)
-      scale = size_of(map, state)
-      integrated = 0
+      orbit(1)%state = map%to_state(position, velocity)
+      orbit(1)%periods = motion%periods
+      scale = size_of(map, orbit(1)%state)
+      is_modal = .false.
       select type (map)
       type is (collocation_map)
-         ! A motion that is stable with larger steps, and is found where its linearised map leads, is stable.
-         if (allocated(monodromy)) then
-            call find_orbit(map, state, motion%periods, scale, visitor, orbit(1), is_found(1), monodromy)
-            call reduce_periods(solo, [1], is_found, visitor, orbit)
-            integrated = orbit(1)%integrated
-            if (is_found(1)) state = orbit(1)%state
-         end if
+         is_modal = .true.
       end select
-      if (options%multipliers .or. .not. orbit(1)%given .or. .not. is_found(1)) then
-         orbit(1)%state = state
-         orbit(1)%periods = motion%periods
-         call find_stable_orbits(solo, [1], [scale], visitor, orbit, is_found)
+      if (is_modal .and. allocated(monodromy)) then
+         orbit(1)%monodromy = monodromy
+         call follow_orbits(solo, [1], scale, visitor, orbit, is_found, renew=options%multipliers)
       else
-         orbit(1)%integrated = 0
+         call find_stable_orbits(solo, [1], scale, visitor, orbit, is_found)
       end if
-      motion%periods_integrated = motion%periods_integrated + integrated + orbit(1)%integrated
+      motion%periods_integrated = motion%periods_integrated + orbit(1)%integrated
       found = is_found(1) .and. orbit(1)%periods == motion%periods
       if (.not. found) return
       call describe_orbit(orbit(1), options, motion)
-      select type (map)
-      type is (collocation_map)
-         monodromy = orbit(1)%monodromy
-      end select
+      if (is_modal) monodromy = orbit(1)%monodromy
    end subroutine follow_motion
 
    !> Find and measure a motion with the judging integrator; the difference is the error estimate.

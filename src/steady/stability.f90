@@ -11,7 +11,7 @@ module spurflex_steady_stability
    implicit none
    private
 
-   public :: find_stable_orbits, reduce_periods, largest_multiplier
+   public :: find_stable_orbits, follow_orbits, reduce_periods, largest_multiplier
 
    !> Distance of the sections of a motion, beside its size, that is none.
    real(wp), parameter :: same_section = 1.0e-6_wp
@@ -45,6 +45,49 @@ contains
       call reduce_periods(points, members, found, visitor, orbits)
       call keep_stable(orbits, found)
    end subroutine find_stable_orbits
+
+   !> Find stable motions again with other steps, each near where it was with those before. Newton's method begins with the
+   !> monodromy of then: what it leads to without a new one is as stable as it was.
+   subroutine follow_orbits(points, members, scale, visitor, orbits, found, renew)
+      !> The points.
+      class(ensemble), intent(inout) :: points
+      !> Which of them, shape (n).
+      integer, intent(in) :: members(:)
+      !> Size of each motion, shape (n) [m].
+      real(wp), intent(in) :: scale(:)
+      !> Let in now and then.
+      class(attendant), intent(inout) :: visitor
+      !> The stable motions with their monodromies, as they were before, as they are after, shape (n).
+      type(periodic_orbit), intent(inout) :: orbits(:)
+      !> It is there, and it is stable, shape (n).
+      logical, intent(out) :: found(:)
+      !> The monodromy must be that of the motion itself.
+      logical, intent(in) :: renew
+
+      type(periodic_orbit) :: near(size(orbits))
+      integer, allocatable :: open(:)
+      integer :: integrated(size(orbits)), i
+      logical :: is_found(size(orbits))
+
+      near = orbits
+      call find_orbits(points, members, scale, visitor, near, found, monodromy_is_near=.true., roughly=.true.)
+      call reduce_periods(points, members, found, visitor, near)
+      integrated = near%integrated
+      open = pack([(i, i=1, size(orbits))], renew .or. .not. (found .and. near%given))
+      do i = 1, size(orbits)
+         if (found(i)) orbits(i) = near(i)
+      end do
+      orbits%integrated = integrated
+      if (size(open) == 0) return
+      near(:size(open)) = orbits(open)
+      call find_stable_orbits(points, members(open), scale(open), visitor, near(:size(open)), is_found(:size(open)), &
+                              roughly=.not. renew)
+      do i = 1, size(open)
+         near(i)%integrated = near(i)%integrated + integrated(open(i))
+         orbits(open(i)) = near(i)
+         found(open(i)) = is_found(i)
+      end do
+   end subroutine follow_orbits
 
    !> Take the shortest period of motions that were found with a multiple of it.
    subroutine reduce_periods(points, members, found, visitor, orbits)
