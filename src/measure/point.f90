@@ -218,12 +218,17 @@ contains
       type(response) :: judged
       type(periodic_orbit) :: orbit
       real(wp), allocatable :: state(:)
+      real(wp) :: scale
 
       call load_judge(solver, equations, position, velocity, state, agreed)
       if (.not. agreed) return
-      call find_orbit(solver%judge, state, periods, size_of(solver%judge, state), visitor, orbit, agreed, monodromy, &
-                      judge_share*solver%options%tolerance)
+      scale = size_of(solver%judge, state)
+      call find_orbit(solver%judge, state, periods, scale, visitor, orbit, agreed, monodromy, judge_share*solver%options%tolerance)
       answer%periods_integrated = answer%periods_integrated + orbit%integrated
+      if (.not. agreed .and. allocated(monodromy)) then
+         call find_orbit(solver%judge, state, periods, scale, visitor, orbit, agreed)
+         answer%periods_integrated = answer%periods_integrated + orbit%integrated
+      end if
       if (.not. agreed) return
       judged = empty_response()
       call measure_periods(solver%judge, periods, orbit%state, equations, solver%orbit, judged)

@@ -73,7 +73,9 @@ contains
       call find_orbits(points, members, scale, visitor, near, found, monodromy_is_near=.true., roughly=.true.)
       call reduce_periods(points, members, found, visitor, near)
       integrated = near%integrated
-      open = pack([(i, i=1, size(orbits))], renew .or. .not. (found .and. near%given))
+      ! Where a new monodromy was needed, or another period was found, the steps may have led away.
+      found = found .and. near%given .and. near%periods == orbits%periods
+      open = pack([(i, i=1, size(orbits))], renew .or. .not. found)
       do i = 1, size(orbits)
          if (found(i)) orbits(i) = near(i)
       end do
