@@ -108,6 +108,11 @@ contains
          do i = 1, size(equations)
             if (steps(i) > most_lane_steps .or. any(steps(:i - 1) == steps(i))) cycle
             group = pack([(k, k=1, size(equations))], steps == steps(i))
+            if (size(group) == size(equations)) then
+               call respond_in_lanes(solver%lanes, equations, part, steps(i), positions, velocities, group, visitor, &
+                                     solver%effort, motions, orbits, answers, done)
+               cycle
+            end if
             ! Given as an argument, `equations(group)` would be a copy whose components gfortran never frees.
             chosen = equations(group)
             call respond_in_lanes(solver%lanes, chosen, part(group), steps(i), positions, velocities, group, visitor, &
