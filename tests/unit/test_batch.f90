@@ -19,7 +19,7 @@ module test_batch
    use spurflex_steady_sections, only: weighted_norm
    use spurflex_steady_orbit, only: periodic_orbit
    use spurflex_steady_shooting, only: find_orbit, find_orbits
-   use spurflex_steady_stability, only: find_stable_orbits
+   use spurflex_steady_stability, only: find_stable_orbits, follow_orbits
    use spurflex_steady_transient, only: advance_transients, begin_transient, transient_type, watch_from_now
    use test_support, only: check, error_type, new_unittest, test_failed, unittest_type
    implicit none
@@ -59,6 +59,7 @@ contains
                   new_unittest('a hopeless member disturbs no other', test_hopeless), &
                   new_unittest('a monodromy that is near, or rough', test_near), &
                   new_unittest('shortest periods of stable orbits', test_stable), &
+                  new_unittest('stable motions followed to other steps', test_follow), &
                   new_unittest('no bit of a transient depends on the others', test_transients), &
                   new_unittest('a transient that diverges disturbs no other', test_diverging) &
                   ]
@@ -805,6 +806,68 @@ contains
       call find_stable_orbits(points, members(i:i), [motion_size], nobody, again, found(:1))
       call check(error, .not. found(1), 'a motion of one period at 5500 rev/min is not stable')
    end subroutine test_stable
+
+   !> Stable motions are found again with other steps, with their own monodromies and where those are no good, in lanes of which
+   !> only theirs are loaded.
+   subroutine test_follow(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      !> Newton's tolerance and a little more, beside the size of the motion.
+      real(wp), parameter :: tolerance = 1.0e-8_wp
+      integer, parameter :: steps = 48, finer = 97
+      type(lane_ensemble) :: points
+      type(equations_type), allocatable :: equations(:)
+      type(modal_system), allocatable :: modal(:)
+      type(periodic_orbit), allocatable :: orbits(:), followed(:), expected(:)
+      type(no_attendant) :: nobody
+      real(wp), allocatable :: starts(:, :)
+      integer, allocatable :: members(:)
+      logical, allocatable :: found(:)
+      integer :: i, n, k
+      logical :: renew
+
+      call make_points(steps, points, equations, modal, starts, error)
+      if (allocated(error)) return
+      call make_members(starts, members, orbits)
+      n = size(members)
+      allocate (found(n))
+      call find_stable_orbits(points, members, spread(motion_size, 1, n), nobody, orbits, found)
+      call check(error, all(found), 'motions with few steps')
+      if (allocated(error)) return
+      call points%load(equations, modal, [(k, k=1, 2*speeds)], finer, members)
+      expected = orbits
+      call find_stable_orbits(points, members, spread(motion_size, 1, n), nobody, expected, found)
+      call check(error, all(found), 'motions with more steps')
+      if (allocated(error)) return
+      do k = 0, 1
+         renew = k == 1
+         followed = orbits
+         ! Some that are no good at all.
+         do i = 1, n, 5
+            followed(i)%monodromy = -followed(i)%monodromy
+         end do
+         call follow_orbits(points, members, spread(motion_size, 1, n), nobody, followed, found, renew)
+         do i = 1, n
+            call check(error, found(i) .and. followed(i)%periods == expected(i)%periods, 'found '//to_text(i))
+            if (allocated(error)) return
+            call check(error, weighted_norm(points%weight(:, members(i)), followed(i)%state - expected(i)%state), 0.0_wp, &
+                       tolerance*motion_size, 'motion '//to_text(i))
+            if (allocated(error)) return
+            if (renew) call check(error, .not. followed(i)%given .and. maxval(abs(followed(i)%monodromy - expected(i)%monodromy)) &
+                                  < 1.0e-4_wp*maxval(abs(expected(i)%monodromy)), 'monodromy '//to_text(i))
+            if (allocated(error)) return
+         end do
+      end do
+      ! The motion of one period at 5500 rev/min is there, but not stable: a new monodromy tells.
+      i = 9
+      followed = orbits(i:i)
+      followed(1)%periods = 1
+      call find_orbits(points, members(i:i), [motion_size], nobody, followed, found(:1))
+      if (.not. found(1)) return
+      call follow_orbits(points, members(i:i), [motion_size], nobody, followed, found(:1), renew=.true.)
+      call check(error, .not. found(1), 'a motion of one period at 5500 rev/min is not stable')
+   end subroutine test_follow
 
    !> Two transients are the same, bit by bit.
    pure function same_transient(a, b) result(same)
