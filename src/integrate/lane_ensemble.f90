@@ -5,7 +5,8 @@ module spurflex_integrate_lane_ensemble
    use spurflex_integrate_lane_newmark, only: new_newmark_rule, advance_newmark, carry_newmark
    use spurflex_integrate_lane_rule, only: lanes, most_modes, points, abreast, lane_rule, mesh_cycle, lane_gain, lane_record, &
       point_rule, new_point_rule, new_mesh_cycle, load_rule
-   use spurflex_integrate_lane_step, only: advance_lanes, carry_lane_tangents
+   use spurflex_integrate_lane_step, only: advance_lanes
+   use spurflex_integrate_lane_tangents, only: carry_lane_tangents
    use spurflex_model_equations, only: equations_type
    use spurflex_model_modal, only: modal_system, sum_of_moduli
    implicit none
@@ -131,21 +132,22 @@ contains
       !> Tangents that see the same contact, shape (seats, tangents, size).
       real(wp), intent(inout), optional, contiguous :: tangents(:, :, :)
 
-      if (present(tangents)) then
-         self%steps_done(steps_of_tangents) = self%steps_done(steps_of_tangents) + int(self%steps, i8)*size(tangents, 2)
-      end if
+      integer :: rounds
+
       self%steps_done(steps_of_motions) = self%steps_done(steps_of_motions) + self%steps
       if (self%by_newmark .and. present(tangents)) then
          call advance_newmark(self%rule, self%pitch, states, self%smallest, self%largest, self%gain)
          call carry_newmark(self%rule, self%steps, self%gain, size(tangents, 2), tangents)
+         rounds = size(tangents, 2)
       else if (self%by_newmark) then
          call advance_newmark(self%rule, self%pitch, states, self%smallest, self%largest)
       else if (.not. present(tangents)) then
          call advance_lanes(self%rule, self%pitch, states, self%smallest, self%largest)
       else
          call advance_lanes(self%rule, self%pitch, states, self%smallest, self%largest, self%gain)
-         call carry_lane_tangents(self%rule, self%steps, self%gain, size(tangents, 2), tangents)
+         call carry_lane_tangents(self%rule, self%steps, self%gain, size(tangents, 2), tangents, rounds)
       end if
+      if (present(tangents)) self%steps_done(steps_of_tangents) = self%steps_done(steps_of_tangents) + int(self%steps, i8)*rounds
    end subroutine advance_seats
 
    !> Advance all lanes by one mesh period and record it.

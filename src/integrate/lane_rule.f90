@@ -15,7 +15,7 @@ module spurflex_integrate_lane_rule
    private
 
    public :: lanes, most_modes, points, abreast
-   public :: lane_rule, mesh_cycle, lane_gain, lane_record, point_rule, new_point_rule, new_mesh_cycle, load_rule
+   public :: lane_rule, mesh_cycle, lane_gain, lane_record, point_rule, new_point_rule, new_mesh_cycle, load_rule, copy_rule
 
    !> Lanes: one or two vectors of the processor.
    integer, parameter :: lanes = 8
@@ -206,5 +206,29 @@ contains
       rule%damping(lane) = point%damping
       rule%force(lane) = point%force
    end subroutine load_rule
+
+   !> Copy the coefficients in use: copies on the stack are aligned to the vectors.
+   pure subroutine copy_rule(rule, copy)
+      !> Coefficients.
+      type(lane_rule), intent(in) :: rule
+      !> Their copy.
+      type(lane_rule), intent(inout) :: copy
+
+      integer :: m
+
+      m = rule%modes
+      copy%modes = m
+      copy%half_re(:, :m) = rule%half_re(:, :m)
+      copy%half_im(:, :m) = rule%half_im(:, :m)
+      copy%full_re(:, :m) = rule%full_re(:, :m)
+      copy%full_im(:, :m) = rule%full_im(:, :m)
+      copy%taken_re(:, :m, :) = rule%taken_re(:, :m, :)
+      copy%taken_im(:, :m, :) = rule%taken_im(:, :m, :)
+      copy%middle = rule%middle
+      copy%end = rule%end
+      copy%static = rule%static
+      copy%damping = rule%damping
+      copy%force = rule%force
+   end subroutine copy_rule
 
 end module spurflex_integrate_lane_rule

@@ -12,7 +12,8 @@ program time_kernels
    use spurflex_integrate_lane_newmark, only: new_newmark_rule, advance_newmark, carry_newmark
    use spurflex_integrate_lane_rule, only: lanes, most_modes, points, lane_rule, mesh_cycle, lane_gain, lane_record, &
       point_rule, new_point_rule, new_mesh_cycle, load_rule
-   use spurflex_integrate_lane_step, only: advance_lanes, carry_lane_tangents
+   use spurflex_integrate_lane_step, only: advance_lanes
+   use spurflex_integrate_lane_tangents, only: carry_lane_tangents
    use spurflex_io_case, only: case_type
    use spurflex_io_deck, only: read_deck
    use spurflex_model_equations, only: equations_type, new_equations
@@ -257,6 +258,7 @@ contains
 
       real(wp), dimension(lanes) :: smallest, largest
       integer(int64) :: round
+      integer :: carried
 
       if (kernel%what == tangents_newmark .or. kernel%what == tangents_collocation) call set_tangents(kernel%tangents)
       smallest = 0.0_wp
@@ -277,7 +279,7 @@ contains
             call carry_newmark(kernel%rule, kernel%pitch%steps, kernel%gain, 2*kernel%modes, kernel%tangents)
          case (tangents_collocation)
             if (mod(round, 8_int64) == 0) call set_tangents(kernel%tangents)
-            call carry_lane_tangents(kernel%rule, kernel%pitch%steps, kernel%gain, 2*kernel%modes, kernel%tangents)
+            call carry_lane_tangents(kernel%rule, kernel%pitch%steps, kernel%gain, 2*kernel%modes, kernel%tangents, carried)
          case (peak_few)
             call add_few(smallest)
          case (peak_many)
