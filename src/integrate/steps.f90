@@ -7,7 +7,7 @@ module spurflex_integrate_steps
    implicit none
    private
 
-   public :: first_steps, better_steps, most_steps, aim, first_lane_steps, better_lane_steps, &
+   public :: first_steps, better_steps, most_steps, aim, judge_share, first_lane_steps, better_lane_steps, &
       newmark_lane_steps, most_lane_steps, most_newmark_steps
 
    !> Steps per mesh period at most.
@@ -36,6 +36,9 @@ module spurflex_integrate_steps
 
    !> Aim at this share of the tolerance.
    real(wp), parameter :: aim = 0.5_wp
+
+   !> Share of the tolerance by which the orbit of a judge may be off: it is only to tell how far the other is.
+   real(wp), parameter :: judge_share = 0.01_wp
 
    !> Times by which the number of steps grows at most, and at least, at once.
    real(wp), parameter :: most_growth = 16.0_wp, least_growth = 1.2_wp

@@ -26,7 +26,7 @@ module spurflex_measure_harmonic_motion
 
    !> cos(k theta) and sin(k theta) at the samples of half a period, both ends included; those of the other half mirror them.
    type :: table_type
-      !> Shape (0:samples/2, 0:order).
+      !> Shape (0:samples/2, order).
       real(wp), allocatable :: cosine(:, :), sine(:, :)
    end type table_type
 
@@ -117,8 +117,8 @@ contains
       real(wp) :: phase
       integer :: k, s
 
-      allocate (table%cosine(0:half, 0:order), table%sine(0:half, 0:order))
-      do k = 0, order
+      allocate (table%cosine(0:half, order), table%sine(0:half, order))
+      do k = 1, order
          do s = 0, half
             phase = pi*real(mod(k*s, 2*half), wp)/real(half, wp)
             table%cosine(s, k) = cos(phase)

@@ -7,11 +7,10 @@ module spurflex_measure_lane_solver
    use spurflex_integrate_lane_ensemble, only: lane_ensemble
    use spurflex_integrate_lane_observe, only: point_view, new_point_view, lane_view
    use spurflex_integrate_options, only: solver_options, integrator_newmark
-   use spurflex_integrate_steps, only: aim, better_lane_steps, newmark_lane_steps
+   use spurflex_integrate_steps, only: aim, judge_share, better_lane_steps, newmark_lane_steps
    use spurflex_measure_harmonic_motion, only: series_sampler
    use spurflex_measure_lane_motion, only: measure_lanes, quarter_of, parts, begin_of_window, first_half, second_half
    use spurflex_measure_linear_points, only: harmonics_do, measure_linear
-   use spurflex_measure_point, only: judge_share
    use spurflex_measure_response, only: response, empty_response, describe_motion, relative_difference, status_inaccurate, &
       reason_given_steps
    use spurflex_model_equations, only: equations_type
@@ -333,6 +332,7 @@ contains
       logical, intent(inout) :: complete(:)
 
       integer :: steps(size(equations)), i
+      integer, allocatable :: group(:)
 
       do i = 1, size(equations)
          steps(i) = measuring_steps(solver, equations(i))
@@ -341,8 +341,9 @@ contains
          if (any(steps(members(:i - 1)) == steps(members(i)))) cycle
          solver%points%by_newmark = solver%by_newmark()
          call solver%points%load(equations, solver%modal, part, steps(members(i)))
-         call load_judge(solver, equations, part, members)
-         call measure_group(pack(members, steps(members) == steps(members(i))))
+         group = pack(members, steps(members) == steps(members(i)))
+         call load_judge(solver, equations, part, group)
+         call measure_group(group)
       end do
       ! What is not finite may have had too few steps.
       complete(members) = answers(members)%error_estimate < huge(1.0_wp)

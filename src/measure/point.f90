@@ -14,7 +14,7 @@ module spurflex_measure_point
    use spurflex_integrate_factory, only: make_map
    use spurflex_integrate_options, only: solver_options, integrator_newmark
    use spurflex_integrate_period_map, only: period_map, orbit_type
-   use spurflex_integrate_steps, only: first_steps, better_steps, most_steps
+   use spurflex_integrate_steps, only: first_steps, better_steps, most_steps, judge_share
    use spurflex_measure_motion, only: motion_measure
    use spurflex_measure_response, only: response, empty_response, status_missing, status_inaccurate, &
       status_diverged, reason_non_finite, reason_no_step, reason_given_steps, reason_most_steps, reason_not_confirmed, &
@@ -29,10 +29,7 @@ module spurflex_measure_point
    implicit none
    private
 
-   public :: point_solver, new_point_solver, respond_alone, judge_share
-
-   !> Share of the tolerance by which the judge's orbit may be off: it is only to tell how far the other is.
-   real(wp), parameter :: judge_share = 0.01_wp
+   public :: point_solver, new_point_solver, respond_alone
 
    !> What solves points one after the other; keeps what the next point can use again.
    type :: point_solver

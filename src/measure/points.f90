@@ -179,7 +179,7 @@ contains
       type(effort_type), intent(inout) :: effort
       !> Motion of every point; its status remains `status_missing` if it must be found by other means.
       type(steady_motion), intent(inout) :: motions(:)
-      !> Orbit of every point that is periodic and not complete, in its own modes.
+      !> Of every point that is periodic and not complete, the monodromy in its own modes; nothing else is filled in.
       type(periodic_orbit), intent(inout) :: orbits(:)
       !> Response of every point.
       type(response), intent(inout) :: answers(:)

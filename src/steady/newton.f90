@@ -114,7 +114,7 @@ contains
       if (previous < huge(1.0_wp) .and. item%length <= min(trusted_step*scale, fast_shrinkage*previous)) then
          found = found .or. item%length*(item%length/previous) <= near_enough*scale
       end if
-      ! A step with a monodromy that is near leaves no more than the next one would have to be.
+      ! The next step with a monodromy that is near would have to be smaller by this factor; the first one is trusted to lead there.
       if (pass == pass_near) found = found .or. near_shrinkage*item%length <= near_enough*scale
       if (found .or. item%iteration == most_iterations) return
       item%pass = pass

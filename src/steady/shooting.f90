@@ -21,7 +21,7 @@ module spurflex_steady_shooting
       type(newton_item), allocatable :: items(:)
       !> Give up where contact is lost; the monodromy may be that of a state nearby.
       logical :: only_affine = .false., roughly = .false.
-      !> What may be left of the distance to a motion, beside its size.
+      !> What may be left of the distance to a motion that takes one mesh period, beside its size.
       real(wp) :: near_enough = converged_step
    end type newton_type
 
@@ -112,7 +112,8 @@ contains
       logical, intent(in), optional :: monodromy_is_near
       !> The monodromy may be that of a state nearby, `near_step` away at most.
       logical, intent(in), optional :: roughly
-      !> What may be left of the distance to a motion, beside its size, if that is more than Newton's method leaves.
+      !> What may be left of the distance to a motion that takes one mesh period, beside its size, if that is more than Newton's
+      !> method leaves.
       real(wp), intent(in), optional :: near_enough
 
       type(newton_type) :: newton
@@ -197,7 +198,7 @@ contains
             if (.not. ends(k)) cycle
             associate (p => seated(k))
                call end_pass(points%weight(:, members(p)), points%half_backlash, scale(p), states(k, :), newton%only_affine, &
-                             newton%roughly, newton%near_enough, newton%items(p), orbits(p), found(p))
+                             newton%roughly, left_over(orbits(p)%periods), newton%items(p), orbits(p), found(p))
             end associate
             if (runs(newton%items(seated(k)), with_tangents)) then
                call begin_pass(seated(k))
@@ -214,6 +215,16 @@ contains
       end do
 
    contains
+
+      !> What may be left of the distance to a motion: the shortest period of a longer one is told by its sections.
+      pure function left_over(periods) result(distance)
+         !> Mesh periods after which it repeats.
+         integer, intent(in) :: periods
+         !> The distance, beside the size of the motion.
+         real(wp) :: distance
+
+         distance = merge(newton%near_enough, converged_step, periods == 1)
+      end function left_over
 
       !> Begin to advance the state of a motion in seat k, and a unit tangent for each component, over its period.
       subroutine begin_pass(p)

@@ -135,7 +135,7 @@ class Spurflex:
         return answers
 
     def time(self, point, tolerance, repeats=WARM):
-        """Time one point alone: the first solution of a process finds cold caches, the median does not."""
+        """Time one point among copies of itself; the median, as the first solution finds cold caches."""
         answer = self.solve([point], tolerance, repeats)[0]
         amplitude = np.nan if answer["amplitude"] is None else answer["amplitude"]
         return Timing(answer["seconds"], amplitude, answer["periods_integrated"], False)

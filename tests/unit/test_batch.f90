@@ -19,7 +19,7 @@ module test_batch
    use spurflex_steady_sections, only: weighted_norm
    use spurflex_steady_orbit, only: periodic_orbit
    use spurflex_steady_shooting, only: find_orbit, find_orbits
-   use spurflex_steady_stability, only: find_stable_orbits, follow_orbits
+   use spurflex_steady_stability, only: find_stable_orbits, follow_orbits, largest_multiplier
    use spurflex_steady_transient, only: advance_transients, begin_transient, transient_type, watch_from_now
    use test_support, only: check, error_type, new_unittest, test_failed, unittest_type
    implicit none
@@ -816,6 +816,8 @@ contains
       !> Newton's tolerance and a little more, beside the size of the motion.
       real(wp), parameter :: tolerance = 1.0e-8_wp
       integer, parameter :: steps = 48, finer = 97
+      !> Largest multiplier from which on stability is decided anew.
+      real(wp), parameter :: doubtful = 0.9_wp
       type(lane_ensemble) :: points
       type(equations_type), allocatable :: equations(:)
       type(modal_system), allocatable :: modal(:)
@@ -824,6 +826,7 @@ contains
       real(wp), allocatable :: starts(:, :)
       integer, allocatable :: members(:)
       logical, allocatable :: found(:)
+      real(wp) :: multiplier
       integer :: i, n, k
       logical :: renew
 
@@ -853,6 +856,10 @@ contains
             if (allocated(error)) return
             call check(error, weighted_norm(points%weight(:, members(i)), followed(i)%state - expected(i)%state), 0.0_wp, &
                        tolerance*motion_size, 'motion '//to_text(i))
+            if (allocated(error)) return
+            multiplier = largest_multiplier(orbits(i))
+            call check(error, .not. (followed(i)%given .and. multiplier >= doubtful), &
+                       'a monodromy that leaves a doubt is not taken over '//to_text(i))
             if (allocated(error)) return
             if (renew) call check(error, .not. followed(i)%given .and. maxval(abs(followed(i)%monodromy - expected(i)%monodromy)) &
                                   < 1.0e-4_wp*maxval(abs(expected(i)%monodromy)), 'monodromy '//to_text(i))
