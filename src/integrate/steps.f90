@@ -16,8 +16,9 @@ module spurflex_integrate_steps
    !> Fewest steps per mesh period of collocation, and of Newmark's method.
    integer, parameter :: fewest_collocation = 8, fewest_newmark = 64
 
-   !> Phase of the free vibration of the mesh in a step of collocation: its error is then about 1e-7 [rad].
-   real(wp), parameter :: collocation_phase = 3.0_wp
+   !> Phase of the free vibration of the mesh in a step of collocation [rad], the error that it has then, and the order of that
+   !> where contact is lost.
+   real(wp), parameter :: collocation_phase = 3.0_wp, collocation_error = 1.0e-7_wp, collocation_order = 6.0_wp
 
    !> The same for Newmark's method: its error is then about 1e-3 [rad].
    real(wp), parameter :: newmark_phase = 0.15_wp
@@ -54,7 +55,7 @@ contains
       !> Steps per mesh period.
       integer :: steps
 
-      real(wp) :: phase
+      real(wp) :: phase, finer
       logical :: is_newmark
 
       phase = cycle_phase(equations)
@@ -63,7 +64,9 @@ contains
       if (is_newmark) then
          steps = max(fewest_newmark, nint(min(phase/newmark_phase, real(most_steps, wp))))
       else
-         steps = max(fewest_collocation, nint(min(phase/collocation_phase, real(most_steps, wp))))
+         finer = 1.0_wp
+         if (present(options)) finer = max(collocation_error/options%tolerance, 1.0_wp)**(1.0_wp/collocation_order)
+         steps = nint(min(finer*max(phase/collocation_phase, real(fewest_collocation, wp)), real(most_steps, wp)))
       end if
    end function first_steps
 

@@ -207,8 +207,7 @@ contains
       integer :: i
 
       again = orbits(members)
-      call follow_orbits(solver%points, members, sizes(solver%points, members, again), visitor, again, is_found, &
-                         renew=solver%options%multipliers)
+      call follow_orbits(solver%points, members, sizes(solver%points, members, again), visitor, again, is_found)
       do i = 1, size(members)
          associate (motion => motions(members(i)))
             motion%periods_integrated = motion%periods_integrated + again(i)%integrated

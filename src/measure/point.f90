@@ -182,7 +182,7 @@ contains
       end select
       if (is_modal .and. allocated(monodromy)) then
          orbit(1)%monodromy = monodromy
-         call follow_orbits(solo, [1], scale, visitor, orbit, is_found, renew=options%multipliers)
+         call follow_orbits(solo, [1], scale, visitor, orbit, is_found)
       else
          call find_stable_orbits(solo, [1], scale, visitor, orbit, is_found)
       end if

@@ -16,9 +16,6 @@ module spurflex_steady_stability
    !> Distance of the sections of a motion, beside its size, that is none.
    real(wp), parameter :: same_section = 1.0e-6_wp
 
-   !> Largest multiplier of a monodromy nearby that leaves no doubt about the stability of a motion.
-   real(wp), parameter :: safe_contraction = 0.9_wp
-
 contains
 
    !> Find stable periodic motions of several points, each near a state.
@@ -50,9 +47,8 @@ contains
    end subroutine find_stable_orbits
 
    !> Find stable motions again with other steps, each near where it was with those before. Newton's method begins with the
-   !> monodromy of then: what it leads to without a new one is stable if that contracts by a margin. How fast Newton's method
-   !> converges bounds what the two monodromies differ by, but near a multiplier of -1 or on the unit circle only loosely.
-   subroutine follow_orbits(points, members, scale, visitor, orbits, found, renew)
+   !> monodromies of then and takes no tangents along; where it leads, one pass with tangents tells whether the motion is stable.
+   subroutine follow_orbits(points, members, scale, visitor, orbits, found)
       !> The points.
       class(ensemble), intent(inout) :: points
       !> Which of them, shape (n).
@@ -65,34 +61,18 @@ contains
       type(periodic_orbit), intent(inout) :: orbits(:)
       !> It is there, and it is stable, shape (n).
       logical, intent(out) :: found(:)
-      !> The monodromy must be that of the motion itself.
-      logical, intent(in) :: renew
 
       type(periodic_orbit) :: near(size(orbits))
-      integer, allocatable :: open(:)
-      integer :: integrated(size(orbits)), i
-      logical :: is_found(size(orbits))
+      integer :: i
 
       near = orbits
       call find_orbits(points, members, scale, visitor, near, found, monodromy_is_near=.true., roughly=.true.)
-      call reduce_periods(points, members, found, visitor, near)
-      integrated = near%integrated
-      ! Where a new monodromy was needed, or another period was found, the steps may have led away.
-      found = found .and. near%given .and. near%periods == orbits%periods
-      call keep_stable(near, found, safe_contraction)
-      open = pack([(i, i=1, size(orbits))], renew .or. .not. found)
       do i = 1, size(orbits)
-         if (found(i)) orbits(i) = near(i)
+         ! Where a new monodromy was needed the steps may have led away.
+         if (found(i) .and. near(i)%given) orbits(i)%state = near(i)%state
       end do
-      orbits%integrated = integrated
-      if (size(open) == 0) return
-      near(:size(open)) = orbits(open)
-      call find_stable_orbits(points, members(open), scale(open), visitor, near(:size(open)), is_found(:size(open)))
-      do i = 1, size(open)
-         near(i)%integrated = near(i)%integrated + integrated(open(i))
-         orbits(open(i)) = near(i)
-         found(open(i)) = is_found(i)
-      end do
+      call find_stable_orbits(points, members, scale, visitor, orbits, found)
+      orbits%integrated = orbits%integrated + near%integrated
    end subroutine follow_orbits
 
    !> Take the shortest period of motions that were found with a multiple of it.
@@ -139,14 +119,12 @@ contains
       end do
    end subroutine reduce_periods
 
-   !> Keep the orbits whose multipliers all lie inside the unit circle, or a smaller one.
-   subroutine keep_stable(orbits, found, contraction)
+   !> Keep the orbits whose multipliers all lie inside the unit circle.
+   subroutine keep_stable(orbits, found)
       !> The orbits, shape (n).
       type(periodic_orbit), intent(in) :: orbits(:)
       !> There is one before; it is stable after, shape (n).
       logical, intent(inout) :: found(:)
-      !> Modulus that no multiplier may reach; one if not given.
-      real(wp), intent(in), optional :: contraction
 
       real(wp), allocatable :: matrices(:, :, :)
       logical :: stable(batch)
@@ -161,7 +139,6 @@ contains
          do k = 1, min(batch, size(members) - first + 1)
             matrices(k, :, :) = orbits(members(first + k - 1))%monodromy
          end do
-         if (present(contraction)) matrices = matrices/contraction
          call contracting(n, matrices, stable)
          do k = 1, min(batch, size(members) - first + 1)
             found(members(first + k - 1)) = stable(k)
