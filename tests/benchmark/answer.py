@@ -329,6 +329,8 @@ def main(argv=None):
         "conventions": [
             "a solver runs with the cheapest setting that is right there, at every point",
             "peers: integration only, without compilation, set-up and the search for extremes",
+            "spurflex: 64 copies of the point that share modes, tables and lanes, over 64 (slow ones: 8), "
+            "with set-up, class of motion, extremes and error estimate; median of up to nine solutions",
             "seconds: peers drop max(rule, fewest) mesh periods, rule = ln(2/error) over the decay rate of "
             "the slowest Floquet multiplier; seconds_fewest: fewest, the periods until the rest of the "
             "transient is seen to stay below half of the error",

@@ -133,6 +133,8 @@ def main(argv=None):
         "conventions": [
             "times are of one point on one core, medians over the repeats; SciPy runs once",
             "peers: integration only, without compilation, set-up and the search for extremes",
+            "spurflex: 64 copies of the point that share modes, tables and lanes, over 64 (slow ones: 8), "
+            "with set-up, class of motion, extremes and error estimate; median of up to nine solutions",
             "peers drop max(rule, fewest) mesh periods: rule = ln(2/level) over the decay rate of the "
             "slowest Floquet multiplier, fewest = until the rest is seen to stay below level/2",
             "heyoka batch: eight lanes with the same point, time divided by eight",
