@@ -88,7 +88,7 @@ contains
       !> There is one.
       logical, intent(out) :: found
 
-      complex(wp), dimension(0:motion%order + size(equations%mesh%stiffness_coefficients)) :: compliance
+      complex(wp) :: compliance(0:motion%order + size(equations%mesh%stiffness_coefficients))
       complex(wp), dimension(0:motion%order) :: stiffness, tooth_error, drive
       complex(wp) :: band(3*size(equations%mesh%stiffness_coefficients) + 1, -motion%order:motion%order)
       complex(wp) :: x(-motion%order:motion%order)

@@ -72,7 +72,7 @@ contains
       logical, intent(out) :: found
       !> A monodromy that is nearly that of the motion, to be tried first, shape (size, size).
       real(wp), intent(in), optional :: monodromy(:, :)
-      !> What may be left of the distance to the motion, beside its size, if that is more than Newton's method leaves.
+      !> As of `find_orbits`.
       real(wp), intent(in), optional :: near_enough
 
       type(solo_ensemble) :: solo

@@ -102,17 +102,13 @@ contains
       real(wp), intent(out) :: seconds
 
       type(response) :: copies(company)
-      real(wp) :: times(most), first
-      integer :: k
+      real(wp) :: first
 
       call solve(problem, spread(point, 1, lanes), copies(:lanes), first)
       seconds = first/real(lanes, wp)
       if (first > slow) return
-      do k = 1, most
-         call solve(problem, spread(point, 1, company), copies, times(k))
-         if (sum(times(:k)) > patience) exit
-      end do
-      seconds = median(times(:min(k, most)))/real(company, wp)
+      call time_list(problem, spread(point, 1, company), most, copies, seconds)
+      seconds = seconds/real(company, wp)
    end subroutine time_point
 
    !> Time a list that is solved at once.
