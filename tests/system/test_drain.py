@@ -228,7 +228,7 @@ def catches_usr1(number):
     return bool(int(re.search(r"SigCgt:\s*(\w+)", status)[1], 16) >> (signal.SIGUSR1 - 1) & 1)
 
 
-@pytest.mark.parametrize("pause", [0.0, 0.3, 0.6])
+@pytest.mark.parametrize("pause", [0.0, 0.15, 0.3, 0.45, 0.6])
 def test_batch_job_is_asked_to_stop_before_it_has_begun(root, batch, tmp_path, pause):
     """The signal is not lost, and no failure, whatever of the job has started."""
     folder = tmp_path / "job"
