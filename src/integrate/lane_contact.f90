@@ -1,11 +1,11 @@
 !> The mesh force of a step of the lanes on one branch of the contact, and its derivative.
 module spurflex_integrate_lane_contact
-   use spurflex_base_kinds, only: wp
+   use spurflex_base_kinds, only: wp, i8
    use spurflex_integrate_lane_rule, only: lanes, points, lane_rule, mesh_cycle
    implicit none
    private
 
-   public :: set_law, solve, find_margin, set_gain, force_at, nothing_added
+   public :: set_law, solve, find_margin, set_gain, force_at, any_below_zero, nothing_added
 
    !> Derivative of what is added to N where no lane leaves its branch.
    real(wp), parameter :: nothing_added(lanes, points, points) = 0.0_wp
@@ -130,6 +130,23 @@ contains
          margin(l) = min(c2, c3, lowest(c1, 4.0_wp*c2 - 3.0_wp*c1 - c3, 2.0_wp*c1 - 4.0_wp*c2 + 2.0_wp*c3))
       end do
    end subroutine find_margin
+
+   !> Any of the lanes has a number below zero. Counted, because that is done in the lanes; one that is not a number is none of them.
+   pure function any_below_zero(number) result(there_is)
+      !> The numbers.
+      real(wp), intent(in) :: number(lanes)
+      !> One is negative.
+      logical :: there_is
+
+      integer(i8) :: below
+      integer :: l
+
+      below = 0_i8
+      do l = 1, lanes
+         below = below + merge(1_i8, 0_i8, number(l) < 0.0_wp)
+      end do
+      there_is = below > 0_i8
+   end function any_below_zero
 
    !> A number that is negative where the parabola s + p u + q u^2, s >= 0, dips below zero between 0 and 1.
    elemental function lowest(s, p, q) result(sign_of)

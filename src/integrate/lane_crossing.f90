@@ -7,7 +7,7 @@
 !> what they had, so that no lane knows its neighbours.
 module spurflex_integrate_lane_crossing
    use spurflex_base_kinds, only: wp
-   use spurflex_integrate_lane_contact, only: solve
+   use spurflex_integrate_lane_contact, only: solve, any_below_zero
    use spurflex_integrate_lane_rule, only: lanes, points, lane_rule, mesh_cycle
    implicit none
    private
@@ -90,7 +90,7 @@ contains
          beyond(l, 2) = merge(beyond(l, 2), 1.0_wp, beyond(l, 1) < 0.0_wp)
          beyond(l, 1) = from(l)
       end do
-      borders = merge(most_borders, 1, minval(beyond(:, 2)) < 0.0_wp)
+      borders = merge(most_borders, 1, any_below_zero(beyond(:, 2)))
       corrected = x
       do k = 1, corrections
          added = rest

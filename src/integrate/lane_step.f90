@@ -1,7 +1,8 @@
 !> Several points of the grid advanced at once, a point in each lane of the processor's vectors.
 module spurflex_integrate_lane_step
    use spurflex_base_kinds, only: wp
-   use spurflex_integrate_lane_contact, only: set_law, solve, find_margin, set_gain, force_at, nothing_added
+   use spurflex_integrate_lane_contact, only: set_law, solve, find_margin, set_gain, force_at, any_below_zero, &
+      nothing_added
    use spurflex_integrate_lane_crossing, only: correct
    use spurflex_integrate_lane_rule, only: lanes, most_modes, points, lane_rule, copy_rule, mesh_cycle, lane_gain, lane_record
    implicit none
@@ -54,7 +55,7 @@ contains
          end do
          do j = 1, r%modes
             do l = 1, lanes
-               free_middle(l) = free_middle(l) + r%half_re(l, j)*re(l, j) - r%half_im(l, j)*im(l, j)
+               free_middle(l) = free_middle(l) + (r%half_re(l, j)*re(l, j) - r%half_im(l, j)*im(l, j))
                carried_re(l, j) = r%full_re(l, j)*re(l, j) - r%full_im(l, j)*im(l, j)
                carried_im(l, j) = r%full_re(l, j)*im(l, j) + r%full_im(l, j)*re(l, j)
                free_end(l) = free_end(l) + carried_re(l, j)
@@ -63,7 +64,7 @@ contains
          call set_law(r, pitch, 2*s - 2, x(:, 1), side, slope, rest)
          call solve(r, free_middle, free_end, slope, rest, x, n)
          call find_margin(r, pitch, 2*s - 2, side, x, margin)
-         crosses = minval(margin) < 0.0_wp
+         crosses = any_below_zero(margin)
          if (crosses) then
             call correct(r, pitch, 2*s - 2, side, free_middle, free_end, slope, rest, margin, x, n, added_slope, &
                          smallest, largest, present(gain))

@@ -10,6 +10,9 @@ module spurflex_steady_batch
    !> Matrices in a batch.
    integer, parameter :: batch = 8
 
+   !> Matrices that are multiplied together, one vector of the processor, and rows of a tile of the product.
+   integer, parameter :: few = 4, tile = 4
+
    !> Logarithm of the norm of a power beyond which it will not shrink any more: no physical matrix is that far from normal.
    real(wp), parameter :: hopeless = 1000.0_wp
 
@@ -105,97 +108,139 @@ contains
    pure subroutine contracting(n, matrix, it_does)
       !> Rows.
       integer, intent(in) :: n
-      !> Matrices; destroyed.
-      real(wp), intent(inout) :: matrix(batch, n, n)
+      !> Matrices.
+      real(wp), intent(in) :: matrix(batch, n, n)
       !> They do.
       logical, intent(out) :: it_does(batch)
 
-      real(wp) :: square(batch, n, n)
-      real(wp), dimension(batch) :: norm, logarithm
-      integer :: i, j, l, s
+      ! Rows and columns of zeros fill the last tile, and change nothing.
+      real(wp) :: power(few, tile*((n + tile - 1)/tile), tile*((n + tile - 1)/tile))
+      integer :: first
+
+      do first = 1, batch, few
+         power = 0.0_wp
+         power(:, :n, :n) = matrix(first:first + few - 1, :, :)
+         call shrink(size(power, 2), power, it_does(first:first + few - 1))
+      end do
+   end subroutine contracting
+
+   !> The same of a few matrices, which fit into the processor's first cache together with their squares.
+   pure subroutine shrink(n, power, it_does)
+      !> Rows, a multiple of `tile`.
+      integer, intent(in) :: n
+      !> The matrices; destroyed.
+      real(wp), intent(inout) :: power(few, n, n)
+      !> They do.
+      logical, intent(out) :: it_does(few)
+
+      real(wp) :: square(few, n, n)
+      real(wp), dimension(few) :: norm, factor, logarithm
+      integer :: l, s
 
       it_does = .false.
-      ! The power is kept of norm one and the logarithm of its norm apart, so that nothing overflows.
       logarithm = 0.0_wp
+      norm = sum(sum(power**2, 3), 2)
       do s = 0, most_squarings
-         norm = 0.0_wp
-         do j = 1, n
-            do i = 1, n
-               do l = 1, batch
-                  norm(l) = norm(l) + matrix(l, i, j)**2
-               end do
-            end do
-         end do
-         do l = 1, batch
+         ! The power is kept near a norm of one and the logarithm of its norm apart, so that nothing overflows.
+         do l = 1, few
             ! What is not finite never contracts; a power that vanishes has done so.
+            factor(l) = 0.0_wp
             if (logarithm(l) >= hopeless) then
-               norm(l) = 0.0_wp
+               cycle
             else if (.not. norm(l) < huge(1.0_wp)) then
                logarithm(l) = huge(1.0_wp)
-               norm(l) = 0.0_wp
             else if (.not. norm(l) > tiny(1.0_wp)) then
                logarithm(l) = -1.0_wp
-               norm(l) = 0.0_wp
             else
                logarithm(l) = 2.0_wp*logarithm(l) + 0.5_wp*log(norm(l))
-               norm(l) = 1.0_wp/sqrt(norm(l))
+               factor(l) = 1.0_wp/norm(l)
             end if
          end do
          it_does = it_does .or. logarithm < 0.0_wp
          if (all(it_does .or. logarithm >= hopeless)) exit
-         do j = 1, n
-            do i = 1, n
-               do l = 1, batch
-                  matrix(l, i, j) = matrix(l, i, j)*norm(l)
-               end do
-            end do
-         end do
-         call multiply(n, matrix, square)
-         matrix = square
+         call multiply(n, power, square)
+         call rescale(n, square, factor, power, norm)
       end do
-   end subroutine contracting
+   end subroutine shrink
 
-   !> Square matrices. Four rows abreast read the element they share once.
+   !> Square matrices, a tile of four rows and two columns at once: what its elements share is read once.
    pure subroutine multiply(n, matrix, square)
-      !> Rows.
+      !> Rows, a multiple of `tile`.
       integer, intent(in) :: n
       !> Matrices.
-      real(wp), intent(in) :: matrix(batch, n, n)
+      real(wp), intent(in) :: matrix(few, n, n)
       !> Their squares.
-      real(wp), intent(out) :: square(batch, n, n)
+      real(wp), intent(out) :: square(few, n, n)
 
-      real(wp), dimension(batch) :: first, second, third, fourth
+      real(wp), dimension(few) :: a1, a2, a3, a4, b1, b2, b3, b4
       integer :: i, j, k, l
 
-      do j = 1, n
-         do i = 1, n - 3, 4
-            first = 0.0_wp
-            second = 0.0_wp
-            third = 0.0_wp
-            fourth = 0.0_wp
+      do j = 1, n, 2
+         do i = 1, n, tile
+            a1 = 0.0_wp
+            a2 = 0.0_wp
+            a3 = 0.0_wp
+            a4 = 0.0_wp
+            b1 = 0.0_wp
+            b2 = 0.0_wp
+            b3 = 0.0_wp
+            b4 = 0.0_wp
             do k = 1, n
-               do l = 1, batch
-                  first(l) = first(l) + matrix(l, i, k)*matrix(l, k, j)
-                  second(l) = second(l) + matrix(l, i + 1, k)*matrix(l, k, j)
-                  third(l) = third(l) + matrix(l, i + 2, k)*matrix(l, k, j)
-                  fourth(l) = fourth(l) + matrix(l, i + 3, k)*matrix(l, k, j)
+               ! Unrolled at once, this loop would not become one vector.
+               !GCC$ unroll 1
+               do l = 1, few
+                  a1(l) = a1(l) + matrix(l, i, k)*matrix(l, k, j)
+                  a2(l) = a2(l) + matrix(l, i + 1, k)*matrix(l, k, j)
+                  a3(l) = a3(l) + matrix(l, i + 2, k)*matrix(l, k, j)
+                  a4(l) = a4(l) + matrix(l, i + 3, k)*matrix(l, k, j)
+                  b1(l) = b1(l) + matrix(l, i, k)*matrix(l, k, j + 1)
+                  b2(l) = b2(l) + matrix(l, i + 1, k)*matrix(l, k, j + 1)
+                  b3(l) = b3(l) + matrix(l, i + 2, k)*matrix(l, k, j + 1)
+                  b4(l) = b4(l) + matrix(l, i + 3, k)*matrix(l, k, j + 1)
                end do
             end do
-            square(:, i, j) = first
-            square(:, i + 1, j) = second
-            square(:, i + 2, j) = third
-            square(:, i + 3, j) = fourth
-         end do
-         do i = n - mod(n, 4) + 1, n
-            first = 0.0_wp
-            do k = 1, n
-               do l = 1, batch
-                  first(l) = first(l) + matrix(l, i, k)*matrix(l, k, j)
-               end do
-            end do
-            square(:, i, j) = first
+            square(:, i, j) = a1
+            square(:, i + 1, j) = a2
+            square(:, i + 2, j) = a3
+            square(:, i + 3, j) = a4
+            square(:, i, j + 1) = b1
+            square(:, i + 1, j + 1) = b2
+            square(:, i + 2, j + 1) = b3
+            square(:, i + 3, j + 1) = b4
          end do
       end do
    end subroutine multiply
+
+   !> Matrices times a factor each, and their norms.
+   pure subroutine rescale(n, matrix, factor, scaled, norm)
+      !> Rows, an even number.
+      integer, intent(in) :: n
+      !> Matrices.
+      real(wp), intent(in) :: matrix(few, n, n)
+      !> Factors.
+      real(wp), intent(in) :: factor(few)
+      !> The products.
+      real(wp), intent(out) :: scaled(few, n, n)
+      !> Squares of the Frobenius norms of these.
+      real(wp), intent(out) :: norm(few)
+
+      real(wp), dimension(few) :: odd, even
+      integer :: i, j, l
+
+      odd = 0.0_wp
+      even = 0.0_wp
+      do j = 1, n
+         do i = 1, n, 2
+            !GCC$ unroll 1
+            do l = 1, few
+               scaled(l, i, j) = factor(l)*matrix(l, i, j)
+               scaled(l, i + 1, j) = factor(l)*matrix(l, i + 1, j)
+               odd(l) = odd(l) + scaled(l, i, j)**2
+               even(l) = even(l) + scaled(l, i + 1, j)**2
+            end do
+         end do
+      end do
+      norm = odd + even
+   end subroutine rescale
 
 end module spurflex_steady_batch
