@@ -64,7 +64,10 @@ contains
       do
          do k = 1, points%seats
             if (seats(k)%item > 0 .or. next > size(members)) cycle
-            seats(k) = measured_seat(item=next)
+            seats(k)%item = next
+            seats(k)%done = 0
+            seats(k)%smallest = huge(1.0_wp)
+            seats(k)%largest = -huge(1.0_wp)
             do part_of = 1, parts
                call seats(k)%section(part_of)%reset(equations(members(next))%static_observation)
             end do

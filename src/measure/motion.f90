@@ -26,6 +26,8 @@ module spurflex_measure_motion
       integer :: periods = 0
       !> Largest square of each bearing deformation [m2].
       real(wp) :: largest_square(2) = 0.0_wp
+      !> Room for the square of a bearing deformation, its rate and acceleration, shape (0:).
+      real(wp), allocatable :: square(:), rate(:), acceleration(:)
    contains
       !> Begin with a motion.
       procedure :: reset
@@ -62,11 +64,11 @@ contains
       !> The period.
       type(orbit_type), intent(in) :: orbit
 
-      real(wp), dimension(0:orbit%samples) :: square, rate, acceleration
       real(wp) :: ignored, x, y
       integer :: gear, last, s
 
       last = orbit%samples
+      call make_room(self, last)
       call extremes(orbit%time(:last), orbit%value(iy1, :last), orbit%rate(iy1, :last), orbit%acceleration(iy1, :last), &
                     self%smallest, self%largest)
       self%total = self%total + sum(orbit%weight(:last)*orbit%value(iy1, :last))
@@ -78,15 +80,30 @@ contains
             y = self%static(iy(gear)) + orbit%value(iy(gear), s)
             associate (vx => orbit%rate(ix(gear), s), ax => orbit%acceleration(ix(gear), s), &
                        vy => orbit%rate(iy(gear), s), ay => orbit%acceleration(iy(gear), s))
-               square(s) = x**2 + y**2
-               rate(s) = 2.0_wp*(x*vx + y*vy)
-               acceleration(s) = 2.0_wp*(vx**2 + x*ax + vy**2 + y*ay)
+               self%square(s) = x**2 + y**2
+               self%rate(s) = 2.0_wp*(x*vx + y*vy)
+               self%acceleration(s) = 2.0_wp*(vx**2 + x*ax + vy**2 + y*ay)
             end associate
          end do
          ignored = huge(1.0_wp)
-         call extremes(orbit%time(:last), square, rate, acceleration, ignored, self%largest_square(gear))
+         call extremes(orbit%time(:last), self%square(:last), self%rate(:last), self%acceleration(:last), ignored, &
+                       self%largest_square(gear))
       end do
    end subroutine add
+
+   !> Make room for the samples of a period.
+   pure subroutine make_room(self, last)
+      !> Measure.
+      class(motion_measure), intent(inout) :: self
+      !> Samples after the first.
+      integer, intent(in) :: last
+
+      if (allocated(self%square)) then
+         if (ubound(self%square, 1) >= last) return
+         deallocate (self%square, self%rate, self%acceleration)
+      end if
+      allocate (self%square(0:last), self%rate(0:last), self%acceleration(0:last))
+   end subroutine make_room
 
    !> See what another measure of the same motion has seen.
    pure subroutine join(self, other)
@@ -127,7 +144,7 @@ contains
          ! Only a turn that can reach beyond what has been seen is worth its place.
          room = h*(max(abs(rate(s - 1)), abs(rate(s))) + h*max(abs(acceleration(s - 1)), abs(acceleration(s))))
          if (max(value(s - 1), value(s)) + room <= high .and. min(value(s - 1), value(s)) - room >= low) cycle
-         call see_turns(h, value(s - 1:s), rate(s - 1:s), acceleration(s - 1:s), low, high)
+         call see_turns(h, [value(s - 1), value(s)], [rate(s - 1), rate(s)], [acceleration(s - 1), acceleration(s)], low, high)
       end do
    end subroutine extremes
 

@@ -82,7 +82,7 @@ contains
       !> Range that the logarithm of the tangent covered, block by block.
       real(wp), intent(out) :: wander
 
-      real(wp) :: rate(self%blocks), logarithm, low, high
+      real(wp) :: rate(most_blocks), logarithm, low, high
       integer :: k
 
       logarithm = 0.0_wp
@@ -98,11 +98,11 @@ contains
       error = unknown
       periods = self%blocks*self%length
       if (self%blocks < 1) return
-      rate = self%growth(:self%blocks)/real(self%length, wp)
-      exponent = sum(rate)/real(self%blocks, wp)
+      rate = self%growth/real(self%length, wp)
+      exponent = sum(rate(:self%blocks))/real(self%blocks, wp)
       if (self%blocks < 2) return
       ! Blocks of growth that only wanders are not independent: their sum errs by no more than the range.
-      error = min(sqrt(sum((rate - exponent)**2)/real(self%blocks*(self%blocks - 1), wp)), wander/real(periods, wp))
+      error = min(sqrt(sum((rate(:self%blocks) - exponent)**2)/real(self%blocks*(self%blocks - 1), wp)), wander/real(periods, wp))
    end subroutine mean_growth
 
 end module spurflex_steady_lyapunov

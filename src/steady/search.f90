@@ -256,7 +256,8 @@ contains
                                                visitor)
             do i = 1, size(open)
                associate (p => members(open(i)), orbit => candidates(members(open(i)))%orbit)
-                  found(open(i)) = is_there(points, p, orbit, transients(p)%state - orbit%state)
+                  away = transients(p)%state - orbit%state
+                  found(open(i)) = is_there(points, p, orbit, away)
                end associate
             end do
             open = pack(open, .not. found(open))
@@ -265,7 +266,8 @@ contains
       end if
       do i = 1, size(open)
          associate (p => members(open(i)), orbit => candidates(members(open(i)))%orbit)
-            arrives(i) = is_there(points, p, orbit, transients(p)%state - orbit%state)
+            away = transients(p)%state - orbit%state
+            arrives(i) = is_there(points, p, orbit, away)
          end associate
       end do
       open = pack(open, .not. arrives(:size(open)))
@@ -273,7 +275,8 @@ contains
          open = pack(open, found(open))
          do i = 1, size(open)
             associate (orbit => candidates(members(open(i)))%orbit)
-               predicted(:, i) = matmul(orbit%monodromy, transients(members(open(i)))%state - orbit%state)
+               away = transients(members(open(i)))%state - orbit%state
+               predicted(:, i) = matmul(orbit%monodromy, away)
             end associate
          end do
          call advance_transients(points, members(open), transients(members(open))%periods &

@@ -4,7 +4,7 @@ module spurflex_steady_transient
    use spurflex_base_kinds, only: wp
    use spurflex_integrate_ensemble, only: ensemble
    use spurflex_steady_lyapunov, only: lyapunov_sum
-   use spurflex_steady_sections, only: section_ring, weighted_norm, weighted_norms
+   use spurflex_steady_sections, only: section_ring, longest_period, weighted_norm, weighted_norms
    implicit none
    private
 
@@ -139,7 +139,7 @@ contains
                cycle
             end if
             associate (transient => transients(members(seated(k))))
-               call see_section(states(k, :), sizes(k), growth(k), transient)
+               call see_section(states(k, :), sizes(k), growth(k), until(seated(k)), transient)
                if (grows .and. .not. transient%grows) tangents(k, 1, :) = transient%tangent
                if (transient%sound .and. transient%periods < until(seated(k))) cycle
                transient%state = states(k, :)
@@ -153,11 +153,13 @@ contains
    end subroutine advance_transients
 
    !> See the next section of a transient.
-   pure subroutine see_section(state, norm, growth, transient)
+   pure subroutine see_section(state, norm, growth, until, transient)
       !> The section, shape (size), and its norm [m].
       real(wp), intent(in) :: state(:), norm
       !> What the tangent has grown by.
       real(wp), intent(in) :: growth
+      !> Mesh period up to which it is integrated.
+      integer, intent(in) :: until
       !> The transient.
       type(transient_type), intent(inout) :: transient
 
@@ -165,7 +167,8 @@ contains
 
       if (transient%grows) call transient%growth%add(growth)
       transient%periods = transient%periods + 1
-      call transient%ring%add(state)
+      ! Earlier ones will not be asked for.
+      if (until - transient%periods <= longest_period) call transient%ring%add(state)
       transient%sound = norm < diverged_norm
       which = merge(1, 2, transient%periods <= transient%half)
       transient%low(which) = min(transient%low(which), norm)
