@@ -25,6 +25,8 @@ COMPLETE, FAILED_POINTS = 0, 4  # exit codes of the program with a complete resu
 DISTURBED = 0.05  # share of the processors that others may use while a run is timed
 BYTES_PER_KIB = 1024
 MEGABYTE = 1e6
+# Open MPI 4 and 5 bind a job of one or two ranks to the first cores, as if it were alone.
+UNBOUND = {"OMPI_MCA_hwloc_base_binding_policy": "none", "PRTE_MCA_hwloc_default_binding_policy": "none"}
 
 # Options and decks -------------------------------------------------------------------------------
 
@@ -98,8 +100,11 @@ class Program:
         clear(result)
         return deck, result
 
-    def run(self, deck, ranks, memory=False):
-        """Run a deck under mpirun and measure it; memory takes a wrapper, which starts a little later."""
+    def run(self, deck, ranks, memory=False, beside=False):
+        """Run a deck under mpirun and measure it; memory takes a wrapper, which starts a little later.
+
+        beside: another run goes on meanwhile, and must not be bound to the same core.
+        """
         reports = self.folder / "memory"
         wrapper = []
         if memory:
@@ -108,7 +113,8 @@ class Program:
                 old.unlink()
             script = Path(__file__).with_name("rank_memory.py")
             wrapper = [sys.executable, "-S", "-E", str(script), str(reports)]
-        run = measured([*self.mpiexec, str(ranks), *wrapper, str(self.path), str(deck)], ranks)
+        command = [*self.mpiexec, str(ranks), *wrapper, str(self.path), str(deck)]
+        run = measured(command, ranks, UNBOUND if beside else {})
         if memory:
             peaks = [json.loads(path.read_text())["peak_kib"] for path in reports.glob("*.json")]
             run.memory_megabytes = sorted((k * BYTES_PER_KIB / MEGABYTE for k in peaks), reverse=True)
@@ -130,10 +136,12 @@ def mpiexec_of(build):
     return [program[1] if program else "mpirun", flag[1] if flag else "-n"]
 
 
-def measured(command, ranks):
-    """Run a command that starts so many ranks; its output and what it used."""
+def measured(command, ranks, variables=None):
+    """Run a command that starts so many ranks, in an environment with these variables too: what it used."""
+    environment = {**os.environ, **(variables or {})}
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
     busy, start = busy_seconds(), time.perf_counter()
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+    with subprocess.Popen(command, env=environment, **pipes) as process:
         log = process.stdout.read()
         _, status, usage = os.wait4(process.pid, 0)
         wall = time.perf_counter() - start

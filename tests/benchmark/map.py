@@ -1,10 +1,13 @@
 """The map of figure 9, whole program: wall time, efficiency of two ranks, memory, start of a finished deck.
 
+What two cores can do together is measured beside it: two runs of one rank at once, which share nothing but
+the machine. Their speed beside that of one alone is the efficiency that two ranks could have at best.
 Writes map.json and the figure map.
 """
 
 import statistics
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import harness
 import numpy as np
@@ -26,6 +29,7 @@ def measure(program, options, tolerance):
     grid = QUICK_GRID if options.quick else {}
     runs = {ranks: [] for ranks in RANKS}
     reruns = {ranks: [] for ranks in RANKS}
+    at_once = []
     for pair in range(options.repeats):
         # Both orders in turn, so that a drift of the machine hits both alike.
         for ranks in RANKS if pair % 2 == 0 else reversed(RANKS):
@@ -34,6 +38,8 @@ def measure(program, options, tolerance):
             reruns[ranks].append(program.run(deck, ranks))
             wall = runs[ranks][-1].wall_seconds
             print(f"tolerance {tolerance:g}, {ranks} ranks: {wall:.2f} s", flush=True)
+        at_once.append(two_at_once(program, name, tolerance=tolerance, **grid))
+        print(f"tolerance {tolerance:g}, two runs at once: {at_once[-1]:.2f} s", flush=True)
     memory = {}
     for ranks in RANKS:
         deck, result = program.prepare(name, tolerance=tolerance, **grid)
@@ -45,6 +51,10 @@ def measure(program, options, tolerance):
         "program_seconds": {n: spread_known(r.program_seconds for r in runs[n]) for n in RANKS},
         "efficiency_of_two_ranks": efficiency(one, two, "wall_seconds"),
         "efficiency_without_start": efficiency(one, two, "program_seconds"),
+        "two_runs_at_once_seconds": harness.spread(at_once),
+        "efficiency_of_two_runs_at_once": harness.spread(
+            alone.wall_seconds / both for alone, both in zip(one, at_once, strict=True)
+        ),
         "rerun_seconds": {n: harness.spread(r.wall_seconds for r in reruns[n]) for n in RANKS},
         "memory_megabytes_by_rank": memory,
         "disturbed_runs": {n: harness.disturbed(runs[n]) for n in RANKS},
@@ -53,6 +63,14 @@ def measure(program, options, tolerance):
         "runs": [r.summary() for n in RANKS for r in runs[n]],
     }
     return report, result
+
+
+def two_at_once(program, name, **values):
+    """Mean wall time of two runs of one rank that go on at the same time."""
+    decks = [program.prepare(f"{name}-{which}", **values)[0] for which in ("left", "right")]
+    with ThreadPoolExecutor(len(decks)) as pool:
+        runs = list(pool.map(lambda deck: program.run(deck, 1, beside=True), decks))
+    return statistics.mean(run.wall_seconds for run in runs)
 
 
 def spread_known(values):
