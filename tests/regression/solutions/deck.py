@@ -7,7 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-MOTION_PERIOD_1, STATUS_SETTLED, CONTACT_KEPT, CONTACT_LOST = 1, 1, 0, 1
+MOTION_PERIOD_1, STATUS_SETTLED = 1, 1
+CONTACT_KEPT, CONTACT_LOST, CONTACT_BOTH = 0, 1, 2
 
 
 def read_deck(path):
