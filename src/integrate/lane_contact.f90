@@ -131,7 +131,7 @@ contains
       end do
    end subroutine find_margin
 
-   !> Any of the lanes has a number below zero. Counted, because that is done in the lanes; one that is not a number is none of them.
+   !> Any of the lanes has a number below zero; what is not a number is not. Counted, because lanes can count together.
    pure function any_below_zero(number) result(there_is)
       !> The numbers.
       real(wp), intent(in) :: number(lanes)

@@ -722,21 +722,22 @@ contains
       end do
    end subroutine test_hopeless
 
-   !> A monodromy that comes with the orbit saves tangents where it is good, and does no harm where it is not.
-   subroutine test_near(error)
+   !> Stable motions with some steps and with more, in lanes of which only theirs are loaded.
+   subroutine find_twice(points, members, orbits, given, expected, error)
+      !> The points, loaded with more steps.
+      type(lane_ensemble), intent(inout) :: points
+      !> Which of them have a motion, shape (n).
+      integer, allocatable, intent(out) :: members(:)
+      !> The motions with few steps; the same, the monodromy of every fifth no good at all; the motions with more, shape (n).
+      type(periodic_orbit), allocatable, intent(out) :: orbits(:), given(:), expected(:)
       !> Why the test failed.
       type(error_type), allocatable, intent(out) :: error
 
-      !> Newton's tolerance and a little more, beside the size of the motion.
-      real(wp), parameter :: tolerance = 1.0e-8_wp
       integer, parameter :: steps = 48, finer = 97
-      type(lane_ensemble) :: points
       type(equations_type), allocatable :: equations(:)
       type(modal_system), allocatable :: modal(:)
-      type(periodic_orbit), allocatable :: orbits(:), near(:), expected(:)
       type(no_attendant) :: nobody
       real(wp), allocatable :: starts(:, :)
-      integer, allocatable :: members(:)
       logical, allocatable :: found(:)
       integer :: i, n, k
 
@@ -745,27 +746,65 @@ contains
       call make_members(starts, members, orbits)
       n = size(members)
       allocate (found(n))
-      call find_orbits(points, members, spread(motion_size, 1, n), nobody, orbits, found)
+      call find_stable_orbits(points, members, spread(motion_size, 1, n), nobody, orbits, found)
       call check(error, all(found), 'motions with few steps')
       if (allocated(error)) return
-      call points%load(equations, modal, [(k, k=1, 2*speeds)], finer)
+      call points%load(equations, modal, [(k, k=1, 2*speeds)], finer, members)
       expected = orbits
-      call find_orbits(points, members, spread(motion_size, 1, n), nobody, expected, found)
+      call find_stable_orbits(points, members, spread(motion_size, 1, n), nobody, expected, found)
       call check(error, all(found), 'motions with more steps')
       if (allocated(error)) return
-      near = orbits
-      ! Some that are no good at all.
+      given = orbits
       do i = 1, n, 5
-         near(i)%monodromy = -near(i)%monodromy
+         given(i)%monodromy = -given(i)%monodromy
       end do
-      call find_orbits(points, members, spread(motion_size, 1, n), nobody, near, found, monodromy_is_near=.true., roughly=.true.)
-      do i = 1, n
-         call check(error, found(i), 'found '//to_text(i))
+   end subroutine find_twice
+
+   !> Motions are those that are expected.
+   subroutine compare_motions(points, members, orbits, found, expected, error)
+      !> The points.
+      type(lane_ensemble), intent(in) :: points
+      !> Which of them, shape (n).
+      integer, intent(in) :: members(:)
+      !> The motions, shape (n).
+      type(periodic_orbit), intent(in) :: orbits(:)
+      !> They were found, shape (n).
+      logical, intent(in) :: found(:)
+      !> What they should be, shape (n).
+      type(periodic_orbit), intent(in) :: expected(:)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      !> Newton's tolerance and a little more, beside the size of the motion.
+      real(wp), parameter :: tolerance = 1.0e-8_wp
+      integer :: i
+
+      do i = 1, size(members)
+         call check(error, found(i) .and. orbits(i)%periods == expected(i)%periods, 'found '//to_text(i))
          if (allocated(error)) return
-         call check(error, weighted_norm(points%weight(:, members(i)), near(i)%state - expected(i)%state), 0.0_wp, &
+         call check(error, weighted_norm(points%weight(:, members(i)), orbits(i)%state - expected(i)%state), 0.0_wp, &
                     tolerance*motion_size, 'motion '//to_text(i))
          if (allocated(error)) return
       end do
+   end subroutine compare_motions
+
+   !> A monodromy that comes with the orbit saves tangents where it is good, and does no harm where it is not.
+   subroutine test_near(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      type(lane_ensemble) :: points
+      type(periodic_orbit), allocatable :: orbits(:), near(:), expected(:)
+      type(no_attendant) :: nobody
+      integer, allocatable :: members(:)
+      logical, allocatable :: found(:)
+
+      call find_twice(points, members, orbits, near, expected, error)
+      if (allocated(error)) return
+      allocate (found(size(members)))
+      call find_orbits(points, members, spread(motion_size, 1, size(members)), nobody, near, found, monodromy_is_near=.true., &
+                       roughly=.true.)
+      call compare_motions(points, members, near, found, expected, error)
    end subroutine test_near
 
    !> Orbits that were found with a multiple of their period.
@@ -813,46 +852,22 @@ contains
       !> Why the test failed.
       type(error_type), allocatable, intent(out) :: error
 
-      !> Newton's tolerance and a little more, beside the size of the motion.
-      real(wp), parameter :: tolerance = 1.0e-8_wp
-      integer, parameter :: steps = 48, finer = 97
       !> What monodromies of sections as near as that may differ by: they change with the crossings.
       real(wp), parameter :: same_monodromy = 1.0e-4_wp
       type(lane_ensemble) :: points
-      type(equations_type), allocatable :: equations(:)
-      type(modal_system), allocatable :: modal(:)
       type(periodic_orbit), allocatable :: orbits(:), followed(:), expected(:)
       type(no_attendant) :: nobody
-      real(wp), allocatable :: starts(:, :)
       integer, allocatable :: members(:)
       logical, allocatable :: found(:)
-      integer :: i, n, k
+      integer :: i
 
-      call make_points(steps, points, equations, modal, starts, error)
+      call find_twice(points, members, orbits, followed, expected, error)
       if (allocated(error)) return
-      call make_members(starts, members, orbits)
-      n = size(members)
-      allocate (found(n))
-      call find_stable_orbits(points, members, spread(motion_size, 1, n), nobody, orbits, found)
-      call check(error, all(found), 'motions with few steps')
+      allocate (found(size(members)))
+      call follow_orbits(points, members, spread(motion_size, 1, size(members)), nobody, followed, found)
+      call compare_motions(points, members, followed, found, expected, error)
       if (allocated(error)) return
-      call points%load(equations, modal, [(k, k=1, 2*speeds)], finer, members)
-      expected = orbits
-      call find_stable_orbits(points, members, spread(motion_size, 1, n), nobody, expected, found)
-      call check(error, all(found), 'motions with more steps')
-      if (allocated(error)) return
-      followed = orbits
-      ! Some that are no good at all.
-      do i = 1, n, 5
-         followed(i)%monodromy = -followed(i)%monodromy
-      end do
-      call follow_orbits(points, members, spread(motion_size, 1, n), nobody, followed, found)
-      do i = 1, n
-         call check(error, found(i) .and. followed(i)%periods == expected(i)%periods, 'found '//to_text(i))
-         if (allocated(error)) return
-         call check(error, weighted_norm(points%weight(:, members(i)), followed(i)%state - expected(i)%state), 0.0_wp, &
-                    tolerance*motion_size, 'motion '//to_text(i))
-         if (allocated(error)) return
+      do i = 1, size(members)
          call check(error, maxval(abs(followed(i)%monodromy - expected(i)%monodromy))/maxval(abs(expected(i)%monodromy)), 0.0_wp, &
                     same_monodromy, 'monodromy '//to_text(i))
          if (allocated(error)) return
