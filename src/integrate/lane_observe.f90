@@ -1,14 +1,14 @@
 !> What a recorded period of the lanes looks like: displacements, rates and accelerations at the ends of its steps.
 !> The polynomials of degree five between them miss some 1e-5 of a motion with 16 steps, and less by the sixth power with more.
 module spurflex_integrate_lane_observe
-   use spurflex_base_kinds, only: wp, pi
+   use spurflex_base_kinds, only: wp
    use spurflex_integrate_lane_rule, only: lanes, most_modes, abreast, lane_record
-   use spurflex_integrate_period_map, only: orbit_type, observables, reserve_orbit
+   use spurflex_integrate_period_map, only: observables
    use spurflex_model_modal, only: modal_system
    implicit none
    private
 
-   public :: point_view, new_point_view, lane_view, seat_view, observe, take_orbit
+   public :: point_view, new_point_view, lane_view, seat_view, observe
 
    !> Values, rates and accelerations.
    integer, parameter :: orders = 3
@@ -23,8 +23,7 @@ module spurflex_integrate_lane_observe
 
    !> The same of all seats, and what is seen.
    type :: lane_view
-      private
-      real(wp), allocatable :: re(:, :, :, :), im(:, :, :, :), force(:, :, :)
+      real(wp), allocatable, private :: re(:, :, :, :), im(:, :, :, :), force(:, :, :)
       !> Values, rates and accelerations, shape (lanes, displacements, orders,
       !> 0:steps + abreast - 1).
       real(wp), allocatable :: seen(:, :, :, :)
@@ -140,34 +139,5 @@ contains
          end do
       end do
    end subroutine see
-
-   !> The latest period of one lane.
-   subroutine take_orbit(self, lane, steps, frequency, orbit)
-      !> View.
-      type(lane_view), intent(in) :: self
-      !> Lane.
-      integer, intent(in) :: lane
-      !> Steps per mesh period.
-      integer, intent(in) :: steps
-      !> Mesh frequency [rad/s].
-      real(wp), intent(in) :: frequency
-      !> The period.
-      type(orbit_type), intent(inout) :: orbit
-
-      integer :: s
-
-      call reserve_orbit(orbit, steps)
-      orbit%samples = steps
-      orbit%piece = 1
-      do s = 0, steps
-         orbit%time(s) = 2.0_wp*pi*real(s, wp)/(frequency*real(steps, wp))
-         orbit%weight(s) = 1.0_wp/real(steps, wp)
-         orbit%value(:, s) = self%seen(lane, :, 1, s)
-         orbit%rate(:, s) = self%seen(lane, :, 2, s)
-         orbit%acceleration(:, s) = self%seen(lane, :, 3, s)
-      end do
-      ! The trapezoidal rule is exact beyond every order for a periodic motion that is smooth.
-      orbit%weight([0, steps]) = 0.5_wp/real(steps, wp)
-   end subroutine take_orbit
 
 end module spurflex_integrate_lane_observe

@@ -3,8 +3,8 @@ module spurflex_measure_lane_motion
    use spurflex_base_attendant, only: attendant
    use spurflex_base_kinds, only: wp
    use spurflex_integrate_lane_ensemble, only: lane_ensemble
-   use spurflex_integrate_lane_observe, only: point_view, lane_view, seat_view, observe, take_orbit
-   use spurflex_integrate_period_map, only: orbit_type
+   use spurflex_integrate_lane_observe, only: point_view, lane_view, seat_view, observe
+   use spurflex_measure_lane_amplitude, only: lane_amplitude
    use spurflex_measure_motion, only: motion_measure
    use spurflex_measure_response, only: response, contact_of
    use spurflex_model_equations, only: equations_type
@@ -22,8 +22,6 @@ module spurflex_measure_lane_motion
       integer :: item = 0
       !> Mesh periods done.
       integer :: done = 0
-      !> The whole, or the first and the second quarter and the second half.
-      type(motion_measure) :: section(parts)
       !> Extremes of the mesh deflection [m].
       real(wp) :: smallest = huge(1.0_wp), largest = -huge(1.0_wp)
    end type measured_seat
@@ -55,22 +53,20 @@ contains
       type(response), intent(inout), optional :: of_parts(:, :)
 
       type(measured_seat) :: seats(points%seats)
-      type(orbit_type) :: orbit
+      !> The first and the second quarter and the second half, or the whole as the first part.
+      type(lane_amplitude) :: amplitude
+      type(motion_measure) :: measure
       real(wp) :: moving(points%seats, points%size)
-      integer :: next, k, part_of
+      integer :: part_of(points%seats), next, k
 
+      call amplitude%reserve(parts, points%steps)
       moving = 0.0_wp
       next = 1
       do
          do k = 1, points%seats
             if (seats(k)%item > 0 .or. next > size(members)) cycle
-            seats(k)%item = next
-            seats(k)%done = 0
-            seats(k)%smallest = huge(1.0_wp)
-            seats(k)%largest = -huge(1.0_wp)
-            do part_of = 1, parts
-               call seats(k)%section(part_of)%reset(equations(members(next))%static_observation)
-            end do
+            seats(k) = measured_seat(item=next)
+            call amplitude%begin(k, equations(members(next))%static_observation, equations(members(next))%frequency)
             call points%seat(k, members(next))
             call seat_view(view, k, views(part(members(next))))
             moving(k, :) = states(:, next)
@@ -80,27 +76,33 @@ contains
          call points%advance_recorded(moving)
          call observe(view, points%size/2, points%record, points%steps)
          do k = 1, points%seats
+            part_of(k) = 0
+            if (seats(k)%item == 0) cycle
+            seats(k)%done = seats(k)%done + 1
+            part_of(k) = begin_of_window
+            if (present(of_parts)) part_of(k) = 1 + count(seats(k)%done > [quarter_of(periods(seats(k)%item)), &
+                                                                           periods(seats(k)%item)/2])
+         end do
+         call amplitude%add(view%seen, points%steps, part_of)
+         do k = 1, points%seats
             ! An empty seat is integrated with the others, always from zero, so that nothing can overflow.
             if (seats(k)%item == 0) moving(k, :) = 0.0_wp
             if (seats(k)%item == 0) cycle
             associate (seat => seats(k), i => seats(k)%item)
-               call take_orbit(view, k, points%steps, equations(members(i))%frequency, orbit)
-               seat%done = seat%done + 1
-               part_of = begin_of_window
-               if (present(of_parts)) part_of = 1 + count(seat%done > [quarter_of(periods(i)), periods(i)/2])
-               call seat%section(part_of)%add(orbit)
                seat%smallest = min(seat%smallest, points%smallest(k))
                seat%largest = max(seat%largest, points%largest(k))
                if (seat%done < periods(i)) cycle
                states(:, i) = moving(k, :)
                if (present(of_parts)) then
-                  call seat%section(1)%finish(of_parts(begin_of_window, i))
-                  call seat%section(1)%join(seat%section(2))
-                  call seat%section(1)%finish(of_parts(first_half, i))
-                  call seat%section(3)%finish(of_parts(second_half, i))
-                  call seat%section(1)%join(seat%section(3))
+                  measure = amplitude%measure_of(k, [1])
+                  call measure%finish(of_parts(begin_of_window, i))
+                  measure = amplitude%measure_of(k, [1, 2])
+                  call measure%finish(of_parts(first_half, i))
+                  measure = amplitude%measure_of(k, [3])
+                  call measure%finish(of_parts(second_half, i))
                end if
-               call seat%section(1)%finish(whole(i))
+               measure = amplitude%measure_of(k, [1, 2, 3])
+               call measure%finish(whole(i))
                whole(i)%contact = contact_of(seat%smallest, seat%largest, points%half_backlash)
                seat%item = 0
             end associate

@@ -9,14 +9,14 @@ module spurflex_measure_motion
    implicit none
    private
 
-   public :: motion_measure
+   public :: motion_measure, see_turns, iy1, ix, iy
 
+   !> Where y1 and the components of both bearing deformations are among the displacements.
    integer, parameter :: iy1 = 1
    integer, parameter :: ix(2) = [2, 4], iy(2) = [3, 5]
 
    !> What has been seen of one motion.
    type :: motion_measure
-      private
       !> y1, d_x1, d_y1, d_x2, d_y2 at the static equilibrium [m].
       real(wp) :: static(5) = 0.0_wp
       !> Extremes of y1, as deviations from the static equilibrium [m].
@@ -26,15 +26,11 @@ module spurflex_measure_motion
       integer :: periods = 0
       !> Largest square of each bearing deformation [m2].
       real(wp) :: largest_square(2) = 0.0_wp
-      !> Room for the square of a bearing deformation, its rate and acceleration, shape (0:).
-      real(wp), allocatable :: square(:), rate(:), acceleration(:)
    contains
       !> Begin with a motion.
       procedure :: reset
       !> See one mesh period.
       procedure :: add
-      !> See what another measure of the same motion has seen.
-      procedure :: join
       !> Write what was found into a response.
       procedure :: finish
    end type motion_measure
@@ -64,11 +60,11 @@ contains
       !> The period.
       type(orbit_type), intent(in) :: orbit
 
+      real(wp), dimension(0:orbit%samples) :: square, rate, acceleration
       real(wp) :: ignored, x, y
       integer :: gear, last, s
 
       last = orbit%samples
-      call make_room(self, last)
       call extremes(orbit%time(:last), orbit%value(iy1, :last), orbit%rate(iy1, :last), orbit%acceleration(iy1, :last), &
                     self%smallest, self%largest)
       self%total = self%total + sum(orbit%weight(:last)*orbit%value(iy1, :last))
@@ -80,45 +76,16 @@ contains
             y = self%static(iy(gear)) + orbit%value(iy(gear), s)
             associate (vx => orbit%rate(ix(gear), s), ax => orbit%acceleration(ix(gear), s), &
                        vy => orbit%rate(iy(gear), s), ay => orbit%acceleration(iy(gear), s))
-               self%square(s) = x**2 + y**2
-               self%rate(s) = 2.0_wp*(x*vx + y*vy)
-               self%acceleration(s) = 2.0_wp*(vx**2 + x*ax + vy**2 + y*ay)
+               square(s) = x**2 + y**2
+               rate(s) = 2.0_wp*(x*vx + y*vy)
+               acceleration(s) = 2.0_wp*(vx**2 + x*ax + vy**2 + y*ay)
             end associate
          end do
-         ignored = huge(1.0_wp)
-         call extremes(orbit%time(:last), self%square(:last), self%rate(:last), self%acceleration(:last), ignored, &
-                       self%largest_square(gear))
+         ! Nobody asks for the smallest.
+         ignored = -huge(1.0_wp)
+         call extremes(orbit%time(:last), square, rate, acceleration, ignored, self%largest_square(gear))
       end do
    end subroutine add
-
-   !> Make room for the samples of a period.
-   pure subroutine make_room(self, last)
-      !> Measure.
-      class(motion_measure), intent(inout) :: self
-      !> Samples after the first.
-      integer, intent(in) :: last
-
-      if (allocated(self%square)) then
-         if (ubound(self%square, 1) >= last) return
-         deallocate (self%square, self%rate, self%acceleration)
-      end if
-      allocate (self%square(0:last), self%rate(0:last), self%acceleration(0:last))
-   end subroutine make_room
-
-   !> See what another measure of the same motion has seen.
-   pure subroutine join(self, other)
-      !> Measure.
-      class(motion_measure), intent(inout) :: self
-      !> The other measure.
-      class(motion_measure), intent(in) :: other
-
-      self%smallest = min(self%smallest, other%smallest)
-      self%largest = max(self%largest, other%largest)
-      self%total = self%total + other%total
-      self%total_square = self%total_square + other%total_square
-      self%periods = self%periods + other%periods
-      self%largest_square = max(self%largest_square, other%largest_square)
-   end subroutine join
 
    !> Extremes of a sampled quantity whose rates and accelerations are known.
    pure subroutine extremes(time, value, rate, acceleration, low, high)

@@ -7,14 +7,16 @@ module test_lanes
    use pseudo_random, only: random_stream
    use spurflex_base_attendant, only: no_attendant
    use spurflex_base_error, only: library_error => error_type
-   use spurflex_base_kinds, only: wp
+   use spurflex_base_kinds, only: wp, pi
    use spurflex_base_text, only: to_text
    use spurflex_integrate_collocation, only: collocation_map
    use spurflex_integrate_lane_ensemble, only: lane_ensemble, narrow, widen
-   use spurflex_integrate_lane_observe, only: lane_view, new_point_view, observe, seat_view, take_orbit
+   use spurflex_integrate_lane_observe, only: lane_view, new_point_view, observe, seat_view
    use spurflex_integrate_lane_rule, only: lanes
    use spurflex_integrate_options, only: integrator_collocation, integrator_newmark, solver_options
-   use spurflex_integrate_period_map, only: orbit_type
+   use spurflex_integrate_period_map, only: observables, orbit_type, reserve_orbit
+   use spurflex_measure_lane_amplitude, only: lane_amplitude
+   use spurflex_measure_motion, only: motion_measure
    use spurflex_measure_points, only: new_solver, respond, respond_one, solver_type
    use spurflex_measure_response, only: contact_both_flanks, contact_kept, contact_lost, contact_of, response
    use spurflex_model_equations, only: equations_type, new_equations
@@ -55,6 +57,7 @@ contains
                   new_unittest('tangents one by one and together', test_tangent_count), &
                   new_unittest('recorded displacements against the recorded modes', test_record), &
                   new_unittest('recorded periods as by collocation', test_record_limit), &
+                  new_unittest('extremes of all lanes as of one motion', test_amplitudes), &
                   new_unittest('recording and tangents change no bit', test_passengers), &
                   new_unittest('no bit depends on the seat', test_seats), &
                   new_unittest('no bit depends on the neighbours', test_neighbours), &
@@ -527,6 +530,35 @@ contains
       end do
    end subroutine test_tangent_count
 
+   !> What is seen of the latest period of one lane, as a period of a point alone.
+   subroutine take_orbit(self, lane, steps, frequency, orbit)
+      !> View.
+      type(lane_view), intent(in) :: self
+      !> Lane.
+      integer, intent(in) :: lane
+      !> Steps per mesh period.
+      integer, intent(in) :: steps
+      !> Mesh frequency [rad/s].
+      real(wp), intent(in) :: frequency
+      !> The period.
+      type(orbit_type), intent(inout) :: orbit
+
+      integer :: s
+
+      call reserve_orbit(orbit, steps)
+      orbit%samples = steps
+      orbit%piece = 1
+      do s = 0, steps
+         orbit%time(s) = 2.0_wp*pi*real(s, wp)/(frequency*real(steps, wp))
+         orbit%weight(s) = 1.0_wp/real(steps, wp)
+         orbit%value(:, s) = self%seen(lane, :, 1, s)
+         orbit%rate(:, s) = self%seen(lane, :, 2, s)
+         orbit%acceleration(:, s) = self%seen(lane, :, 3, s)
+      end do
+      ! The trapezoidal rule is exact beyond every order for a periodic motion that is smooth.
+      orbit%weight([0, steps]) = 0.5_wp/real(steps, wp)
+   end subroutine take_orbit
+
    !> What is seen of a period is the displacements of the recorded modes, from section to section.
    subroutine test_record(error)
       !> Why the test failed.
@@ -642,6 +674,98 @@ contains
          end do
       end do
    end subroutine test_record_limit
+
+   !> Sums of harmonics that turn between the samples, over some periods in three parts, in lanes of which one is empty: each
+   !> motion by itself gives the same.
+   subroutine test_amplitudes(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      !> Relative.
+      real(wp), parameter :: roundoff = 1.0e-12_wp
+      integer, parameter :: periods = 9, parts = 3, harmonics = 4, empty = 6
+      integer, parameter :: steps(3) = [5, 16, 33]
+      type(random_stream) :: random
+      type(lane_amplitude) :: amplitude
+      type(motion_measure) :: measure, alone(lanes, parts), whole(lanes)
+      type(lane_view) :: view
+      type(orbit_type) :: orbit
+      type(response) :: answer, expected
+      real(wp) :: static(lanes, observables), frequency(lanes), size(2, harmonics), phase, drift
+      integer :: part(lanes), j, k, l, s, period, observable, order
+
+      do j = 1, 3
+         amplitude = lane_amplitude()
+         call amplitude%reserve(parts, steps(j))
+         do observable = 1, observables
+            call random%fill(-1.0_wp, 1.0_wp, static(:, observable))
+         end do
+         call random%fill(1.0e3_wp, 2.0e4_wp, frequency)
+         do l = 1, lanes
+            call amplitude%begin(l, static(l, :), frequency(l))
+            do k = 1, parts
+               call alone(l, k)%reset(static(l, :))
+            end do
+            call whole(l)%reset(static(l, :))
+         end do
+         if (allocated(view%seen)) deallocate (view%seen)
+         allocate (view%seen(lanes, observables, 3, 0:steps(j)), source=0.0_wp)
+         do period = 1, periods
+            do observable = 1, observables
+               do l = 1, lanes
+                  do k = 1, harmonics
+                     call random%fill(-1.0_wp, 1.0_wp, size(:, k))
+                  end do
+                  do s = 0, steps(j)
+                     phase = 2.0_wp*pi*real(s, wp)/real(steps(j), wp)
+                     do order = 1, 3
+                        drift = 0.5_wp*pi*real(order - 1, wp)
+                        view%seen(l, observable, order, s) = frequency(l)**(order - 1)*sum( &
+                                                         [(real(k, wp)**(order - 3)*(size(1, k)*cos(real(k, wp)*phase + drift) &
+                                                                           + size(2, k)*sin(real(k, wp)*phase + drift)), &
+                                                           k=1, harmonics)])
+                     end do
+                  end do
+               end do
+            end do
+            part = [(1 + mod(period*l, parts), l=1, lanes)]
+            part(empty) = 0
+            call amplitude%add(view%seen, steps(j), part)
+            do l = 1, lanes
+               if (l == empty) cycle
+               call take_orbit(view, l, steps(j), frequency(l), orbit)
+               call alone(l, part(l))%add(orbit)
+               call whole(l)%add(orbit)
+            end do
+         end do
+         do l = 1, lanes
+            if (l == empty) cycle
+            do k = 0, parts
+               ! Some lanes never see some of the parts.
+               if (k > 0) then
+                  if (alone(l, k)%periods == 0) cycle
+                  measure = amplitude%measure_of(l, [k])
+                  call alone(l, k)%finish(expected)
+               else
+                  measure = amplitude%measure_of(l, [1, 2, 3])
+                  call whole(l)%finish(expected)
+               end if
+               call measure%finish(answer)
+               call check(error, answer%y1_amplitude, expected%y1_amplitude, roundoff*expected%y1_amplitude, 'amplitude')
+               if (allocated(error)) return
+               call check(error, answer%y1_rms, expected%y1_rms, roundoff*expected%y1_rms, 'rms')
+               if (allocated(error)) return
+               call check(error, answer%y1_max, expected%y1_max, roundoff*expected%y1_amplitude, 'largest')
+               if (allocated(error)) return
+               call check(error, answer%y1_min, expected%y1_min, roundoff*expected%y1_amplitude, 'smallest')
+               if (allocated(error)) return
+               call check(error, maxval(abs(answer%bearing_deformation_max/expected%bearing_deformation_max - 1.0_wp)), 0.0_wp, &
+                          roundoff, 'bearing deformation')
+               if (allocated(error)) return
+            end do
+         end do
+      end do
+   end subroutine test_amplitudes
 
    !> A state goes the same way alone, with tangents and while it is recorded.
    subroutine test_passengers(error)
