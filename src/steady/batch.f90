@@ -10,11 +10,14 @@ module spurflex_steady_batch
    !> Matrices in a batch.
    integer, parameter :: batch = 8
 
-   !> Matrices that are multiplied together, one vector of the processor, and rows of a tile of the product.
+   !> Matrices that are squared side by side, one vector of the processor, and rows of a tile of the square.
    integer, parameter :: few = 4, tile = 4
 
    !> Logarithm of the norm of a power beyond which it will not shrink any more: no physical matrix is that far from normal.
    real(wp), parameter :: hopeless = 1000.0_wp
+
+   !> A matrix whose norm, squared, is this far from one, or its reciprocal, is scaled before it is squared.
+   real(wp), parameter :: far_from_one = 1.0e100_wp
 
    !> Squarings after which a matrix whose powers do not shrink counts as one that does not contract: the largest multiplier is
    !> then within 1e-9 of one, or beyond it.
@@ -134,7 +137,8 @@ contains
       logical, intent(out) :: it_does(few)
 
       real(wp) :: square(few, n, n)
-      real(wp), dimension(few) :: norm, factor, logarithm
+      real(wp), dimension(few) :: norm, factor, logarithm, scaled_norm
+      logical :: is_far(few)
       integer :: l, s
 
       it_does = .false.
@@ -158,6 +162,12 @@ contains
          end do
          it_does = it_does .or. logarithm < 0.0_wp
          if (all(it_does .or. logarithm >= hopeless)) exit
+         is_far = factor > 0.0_wp .and. (norm > far_from_one .or. norm < 1.0_wp/far_from_one)
+         if (any(is_far)) then
+            square = power
+            call rescale(n, square, merge(1.0_wp/sqrt(max(norm, tiny(1.0_wp))), 1.0_wp, is_far), power, scaled_norm)
+            where (is_far) factor = 1.0_wp/scaled_norm
+         end if
          call multiply(n, power, square)
          call rescale(n, square, factor, power, norm)
       end do
@@ -186,7 +196,7 @@ contains
             b3 = 0.0_wp
             b4 = 0.0_wp
             do k = 1, n
-               ! Unrolled at once, this loop would not become one vector.
+               ! If it were unrolled early, the compiler would not make one vector of this loop.
                !GCC$ unroll 1
                do l = 1, few
                   a1(l) = a1(l) + matrix(l, i, k)*matrix(l, k, j)

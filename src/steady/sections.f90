@@ -17,9 +17,10 @@ module spurflex_steady_sections
       private
       !> Weight of each component, shape (size).
       real(wp), allocatable :: weight(:)
-      !> Sections, the one after k periods in column mod(k, room), shape (size, 0:room - 1).
+      !> Sections, the k-th that was taken in column mod(k - 1, room), shape (size, 0:room - 1). Those that are asked for were taken
+      !> one mesh period after the other.
       real(wp), allocatable :: sections(:, :)
-      !> Sections seen.
+      !> Sections taken.
       integer :: seen = 0
    contains
       !> Begin with a motion.

@@ -231,7 +231,7 @@ def describe(report):
         f"{len(report['points'])} points of figure 9; {report['provenance']['processor']}, one core.",
         "Ratios are time of the peer over time of spurflex; points stand for the size of their stratum.",
         "A family takes its fastest right mode at every point; 'batch or events' leaves out located events",
-        "in lanes, which heyoka's tutorials do not have, 'Newton' the fixed-point iteration of CVODE.",
+        "in lanes, which heyoka's tutorials do not have, 'Newton' leaves out CVODE's fixed-point iteration.",
         "'wrong' counts points at which no setting of the peer, or of spurflex, meets the error.",
         "'fewest' charges the peer only for the periods that an oracle would let it run.",
         "",
@@ -302,7 +302,10 @@ def main(argv=None):
     parser.add_argument("--again", action="store_true", help="judge the measurements of answer.json again")
     options = harness.prepare(parser.parse_args(argv))
     if options.again:
-        report = json.loads((options.out / "answer.json").read_text())
+        kept = options.out / "answer.json"
+        if not kept.is_file():
+            raise SystemExit(f"{kept}: there is none to judge again")
+        report = json.loads(kept.read_text())
         finish(report, options)
         return 0
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})

@@ -137,7 +137,7 @@ def mpiexec_of(build):
 
 
 def measured(command, ranks, variables=None):
-    """Run a command that starts so many ranks, in an environment with these variables too: what it used."""
+    """Run a command that starts so many ranks, with these variables added: its output and what it used."""
     environment = {**os.environ, **(variables or {})}
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
     busy, start = busy_seconds(), time.perf_counter()

@@ -1,7 +1,7 @@
 """The map of figure 9, whole program: wall time, efficiency of two ranks, memory, start of a finished deck.
 
-What two cores can do together is measured beside it: two runs of one rank at once, which share nothing but
-the machine. Their speed beside that of one alone is the efficiency that two ranks could have at best.
+What the machine leaves to two is measured beside it: two runs of one rank at once, not bound to cores, which
+share nothing else. Their speed beside that of one alone compares with the efficiency of two ranks.
 Writes map.json and the figure map.
 """
 

@@ -61,6 +61,7 @@ contains
                   new_unittest('shortest periods of stable orbits', test_stable), &
                   new_unittest('stable motions followed to other steps', test_follow), &
                   new_unittest('no bit of a transient depends on the others', test_transients), &
+                  new_unittest('latest sections of long transients', test_latest_sections), &
                   new_unittest('a transient that diverges disturbs no other', test_diverging) &
                   ]
    end subroutine collect_batch
@@ -331,14 +332,16 @@ contains
 
       !> Distances from the unit circle; the eigenvalues of random coordinates are good to 1e-12.
       real(wp), parameter :: distances(6) = [0.999_wp, 0.5_wp, 1.0e-2_wp, 1.0e-4_wp, 1.0e-6_wp, 1.0e-7_wp]
+      integer, parameter :: rows(6) = [2, 4, 6, 10, 16, 18]
       type(random_stream) :: random
       real(wp), allocatable :: matrix(:, :, :)
       real(wp) :: radius(batch)
-      integer :: k, n, l, turn
+      integer :: k, m, n, l, turn
       logical :: expected(batch), found(batch)
 
       do k = 1, size(distances)
-         do n = 2, 18, 4
+         do m = 1, size(rows)
+            n = rows(m)
             do turn = 0, 2
                radius = [(1.0_wp + merge(distances(k), -distances(k), mod(l/(turn + 1), 2) == 0), l=1, batch)]
                expected = radius < 1.0_wp
@@ -359,7 +362,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       !> What the powers grow to before they shrink, but for a factor.
-      real(wp), parameter :: growth(4) = [1.0_wp, 1.0e3_wp, 1.0e6_wp, 1.0e10_wp]
+      real(wp), parameter :: growth(6) = [1.0_wp, 1.0e3_wp, 1.0e6_wp, 1.0e10_wp, 1.0e60_wp, 1.0e120_wp]
       real(wp), parameter :: multipliers(batch) = [0.0_wp, 0.1_wp, 0.9_wp, 0.999_wp, 1.001_wp, 1.1_wp, 2.0_wp, 1.0e3_wp]
       real(wp), allocatable :: matrix(:, :, :)
       real(wp) :: beside
@@ -478,8 +481,7 @@ contains
       beside = [0.0_wp, 1.0e-200_wp, 1.0e200_wp, ieee_value(1.0_wp, ieee_positive_inf), ieee_value(1.0_wp, ieee_quiet_nan)]
       do times = 1, 5
          call draw_spectrum(random, n, radius, matrix)
-         work = matrix
-         call contracting(n, work, expected)
+         call contracting(n, matrix, expected)
          do turn = 1, batch - 1
             work = cshift(matrix, turn, 1)
             call contracting(n, work, found)
@@ -942,6 +944,41 @@ contains
          end do
       end do
    end subroutine test_transients
+
+   !> What is asked of the latest sections does not depend on how many periods were integrated at once.
+   subroutine test_latest_sections(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer, parameter :: steps = 24, long = 201, longest = 64
+      type(lane_ensemble) :: points
+      type(equations_type), allocatable :: equations(:)
+      type(modal_system), allocatable :: modal(:)
+      type(transient_type) :: at_once(1), one_by_one(1)
+      type(no_attendant) :: nobody
+      real(wp), allocatable :: starts(:, :)
+      integer :: k
+
+      call make_points(steps, points, equations, modal, starts, error)
+      if (allocated(error)) return
+      call begin_transient(points%weight(:, 1), points%in_use(:, 1), 0.5_wp*starts(:, 1), at_once(1))
+      one_by_one = at_once
+      call advance_transients(points, [1], [long], at_once, nobody)
+      do k = 1, long
+         call advance_transients(points, [1], [k], one_by_one, nobody)
+      end do
+      call check(error, at_once(1)%periods, long, 'periods')
+      if (allocated(error)) return
+      do k = 1, longest
+         call check(error, same_bits(at_once(1)%ring%distance(k), one_by_one(1)%ring%distance(k)), 'distance '//to_text(k))
+         if (allocated(error)) return
+      end do
+      call check(error, at_once(1)%ring%distance(longest) < huge(1.0_wp), 'the earliest section is there')
+      if (allocated(error)) return
+      call check(error, same_bits(at_once(1)%ring%scale(), one_by_one(1)%ring%scale()), 'scale')
+      if (allocated(error)) return
+      call check(error, all(same_bits(at_once(1)%ring%return_direction(), one_by_one(1)%ring%return_direction())), 'direction')
+   end subroutine test_latest_sections
 
    !> A transient without bounds beside others that go on for long after it has been given up.
    subroutine test_diverging(error)

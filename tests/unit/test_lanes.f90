@@ -687,7 +687,7 @@ contains
       integer, parameter :: steps(3) = [5, 16, 33]
       type(random_stream) :: random
       type(lane_amplitude) :: amplitude
-      type(motion_measure) :: measure, alone(lanes, parts), whole(lanes)
+      type(motion_measure) :: measure, alone(lanes, 0:parts)
       type(lane_view) :: view
       type(orbit_type) :: orbit
       type(response) :: answer, expected
@@ -703,10 +703,9 @@ contains
          call random%fill(1.0e3_wp, 2.0e4_wp, frequency)
          do l = 1, lanes
             call amplitude%begin(l, static(l, :), frequency(l))
-            do k = 1, parts
+            do k = 0, parts
                call alone(l, k)%reset(static(l, :))
             end do
-            call whole(l)%reset(static(l, :))
          end do
          if (allocated(view%seen)) deallocate (view%seen)
          allocate (view%seen(lanes, observables, 3, 0:steps(j)), source=0.0_wp)
@@ -735,21 +734,22 @@ contains
                if (l == empty) cycle
                call take_orbit(view, l, steps(j), frequency(l), orbit)
                call alone(l, part(l))%add(orbit)
-               call whole(l)%add(orbit)
+               call alone(l, 0)%add(orbit)
             end do
          end do
+         measure = amplitude%measure_of(empty, [1, 2, 3])
+         call check(error, measure%periods, 0, 'periods of the empty lane')
+         if (allocated(error)) return
+         call check(error, measure%largest < measure%smallest .and. .not. any(measure%largest_square > 0.0_wp), &
+                    'extremes of the empty lane')
+         if (allocated(error)) return
          do l = 1, lanes
             if (l == empty) cycle
             do k = 0, parts
-               ! Some lanes never see some of the parts.
-               if (k > 0) then
-                  if (alone(l, k)%periods == 0) cycle
-                  measure = amplitude%measure_of(l, [k])
-                  call alone(l, k)%finish(expected)
-               else
-                  measure = amplitude%measure_of(l, [1, 2, 3])
-                  call whole(l)%finish(expected)
-               end if
+               ! Some lanes never see some of the parts; the first is the whole.
+               if (alone(l, k)%periods == 0) cycle
+               measure = amplitude%measure_of(l, pack([1, 2, 3], [1, 2, 3] == k .or. k == 0))
+               call alone(l, k)%finish(expected)
                call measure%finish(answer)
                call check(error, answer%y1_amplitude, expected%y1_amplitude, roundoff*expected%y1_amplitude, 'amplitude')
                if (allocated(error)) return
