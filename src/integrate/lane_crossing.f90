@@ -20,8 +20,8 @@ module spurflex_integrate_lane_crossing
    !> Borders of the backlash.
    integer, parameter :: most_borders = 2
 
-   !> Curvature of a deflection over a step that is none [m].
-   real(wp), parameter :: no_curvature = 1.0e-200_wp
+   !> Clearance that is none, far below the round-off of any [m].
+   real(wp), parameter :: no_clearance = 1.0e-200_wp
 
    !> Gauss points and weights on (0, 1) for the part of a step beyond a border.
    integer, parameter :: gauss = 3
@@ -29,12 +29,18 @@ module spurflex_integrate_lane_crossing
                                                 0.887298334620741688517926539978_wp]
    real(wp), parameter :: gauss_weight(gauss) = [5.0_wp/18.0_wp, 4.0_wp/9.0_wp, 5.0_wp/18.0_wp]
 
+   !> A border that the lanes cross, each its own.
+   type :: border_type
+      !> 1 working flank, -1 back flank; 1 where the step begins in contact there, -1 where not.
+      real(wp), dimension(lanes) :: flank, begins
+      !> Negative in the lanes that are beyond the border at all.
+      real(wp), dimension(lanes) :: beyond
+   end type border_type
+
    !> Clearance to a border over a step, s + p u + q u^2 with u from 0 to 1, for each lane.
    type :: parabola_type
       !> Its coefficients [m].
       real(wp), dimension(lanes) :: s, p, q
-      !> 1 where the step begins in contact at this border, -1 where not.
-      real(wp), dimension(lanes) :: begins
    end type parabola_type
 
 contains
@@ -65,83 +71,121 @@ contains
       !> The derivative is wanted.
       logical, intent(in) :: with_slope
 
-      real(wp), dimension(lanes, points) :: added, corrected, forces
-      real(wp), dimension(lanes, most_borders) :: flank, beyond
-      real(wp), dimension(lanes) :: from, until
+      real(wp), dimension(lanes, points) :: base, once, added, corrected, forces, old_x, old_n
+      real(wp), dimension(lanes) :: from, length
+      type(border_type) :: borders(most_borders)
       type(parabola_type) :: gap
-      integer :: k, l, border, borders
+      real(wp) :: old, anew, leaves
+      integer :: k, l, border, crossed
 
-      ! Which borders are crossed is told by the deflection that the branch alone would have.
-      flank(:, 1) = -1.0_wp
-      flank(:, 2) = 1.0_wp
-      do border = 1, most_borders
-         call set_clearance(rule, pitch, place, flank(:, border), side, x, gap)
+      do k = 1, points
          do l = 1, lanes
-            beyond(l, border) = min(gap%s(l) + 0.5_wp*gap%p(l) + 0.25_wp*gap%q(l), gap%s(l) + gap%p(l) + gap%q(l), &
-                                    merge(min(4.0_wp*gap%q(l)*gap%s(l) - gap%p(l)*gap%p(l), 0.0_wp), 0.0_wp, &
-                                          gap%p(l) < 0.0_wp .and. gap%p(l) + 2.0_wp*gap%q(l) > 0.0_wp))
-            beyond(l, border) = merge(beyond(l, border), 1.0_wp, margin(l) < 0.0_wp)
+            base(l, k) = rule%static(l) + pitch%error(place + k - 1)
+            corrected(l, k) = x(l, k)
+            old_x(l, k) = x(l, k)
+            old_n(l, k) = n(l, k)
          end do
       end do
-      ! Hardly ever a lane crosses both in one step: each has its own one for the first.
-      do l = 1, lanes
-         flank(l, 1) = merge(-1.0_wp, 1.0_wp, beyond(l, 1) < 0.0_wp)
-         from(l) = merge(beyond(l, 1), beyond(l, 2), beyond(l, 1) < 0.0_wp)
-         beyond(l, 2) = merge(beyond(l, 2), 1.0_wp, beyond(l, 1) < 0.0_wp)
-         beyond(l, 1) = from(l)
-      end do
-      borders = merge(most_borders, 1, any_below_zero(beyond(:, 2)))
-      corrected = x
+      call find_borders(pitch%half_backlash, base, side, margin, x, borders)
+      crossed = merge(most_borders, 1, any_below_zero(borders(2)%beyond))
       do k = 1, corrections
-         added = rest
-         do border = 1, borders
-            call set_clearance(rule, pitch, place, flank(:, border), side, corrected, gap)
-            call set_part(gap, beyond(:, border), from, until)
-            call add_force(pitch, place, flank(:, border), gap, from, until, added)
-         end do
+         call set_clearance(pitch%half_backlash, base, borders(1), corrected, gap)
+         call set_part(gap, borders(1)%beyond, from, length)
+         call add_force(pitch, place, borders(1)%flank, gap, from, length, rest, added)
+         if (crossed > 1) then
+            call set_clearance(pitch%half_backlash, base, borders(2), corrected, gap)
+            call set_part(gap, borders(2)%beyond, from, length)
+            once = added
+            call add_force(pitch, place, borders(2)%flank, gap, from, length, once, added)
+         end if
          call solve(rule, free_middle, free_end, slope, added, corrected, forces)
       end do
       do k = 1, points
          do l = 1, lanes
-            x(l, k) = merge(corrected(l, k), x(l, k), margin(l) < 0.0_wp)
-            n(l, k) = merge(forces(l, k), n(l, k), margin(l) < 0.0_wp)
+            ! All are read and written, and no store is under a condition: that would cost several times as much.
+            leaves = margin(l)
+            old = old_x(l, k)
+            anew = corrected(l, k)
+            x(l, k) = merge(anew, old, leaves < 0.0_wp)
+            old = old_n(l, k)
+            anew = forces(l, k)
+            n(l, k) = merge(anew, old, leaves < 0.0_wp)
          end do
       end do
-      do border = 1, borders
-         call set_clearance(rule, pitch, place, flank(:, border), side, x, gap)
-         call reach(flank(:, border), pitch%half_backlash, gap, beyond(:, border), smallest, largest)
+      do border = 1, crossed
+         call set_clearance(pitch%half_backlash, base, borders(border), x, gap)
+         call reach(borders(border), pitch%half_backlash, gap, smallest, largest)
          if (.not. with_slope) cycle
-         call set_part(gap, beyond(:, border), from, until)
-         call add_slope(pitch, place, gap, from, until, border == 1, added_slope)
+         call set_part(gap, borders(border)%beyond, from, length)
+         call add_slope(pitch, place, borders(border)%begins, gap, from, length, border == 1, added_slope)
       end do
    end subroutine correct
 
+   !> Which borders are crossed is told by the deflection that the branch alone would have.
+   pure subroutine find_borders(half_backlash, base, side, margin, x, borders)
+      !> Half of the backlash [m].
+      real(wp), intent(in) :: half_backlash
+      !> Mesh deflection at each point less g.q [m].
+      real(wp), intent(in) :: base(lanes, points)
+      !> Branch at the start; negative in the lanes that leave it.
+      real(wp), intent(in) :: side(lanes), margin(lanes)
+      !> g.q at each point [m].
+      real(wp), intent(in) :: x(lanes, points)
+      !> The borders. Hardly ever a lane crosses both in one step: each has its own one for the first.
+      type(border_type), intent(out) :: borders(most_borders)
+
+      real(wp) :: at_back, at_working, start, middle, end, p, q, back, working, leaves
+      integer :: l
+
+      do l = 1, lanes
+         at_back = merge(1.0_wp, -1.0_wp, side(l) < -0.5_wp)
+         start = at_back*(-(base(l, 1) + x(l, 1)) - half_backlash)
+         middle = at_back*(-(base(l, 2) + x(l, 2)) - half_backlash)
+         end = at_back*(-(base(l, 3) + x(l, 3)) - half_backlash)
+         p = 4.0_wp*middle - 3.0_wp*start - end
+         q = 2.0_wp*(start + end) - 4.0_wp*middle
+         back = min(middle, end, merge(min(4.0_wp*q*start - p*p, 0.0_wp), 0.0_wp, p < 0.0_wp .and. p + 2.0_wp*q > 0.0_wp))
+         at_working = merge(1.0_wp, -1.0_wp, side(l) > 0.5_wp)
+         start = at_working*(base(l, 1) + x(l, 1) - half_backlash)
+         middle = at_working*(base(l, 2) + x(l, 2) - half_backlash)
+         end = at_working*(base(l, 3) + x(l, 3) - half_backlash)
+         p = 4.0_wp*middle - 3.0_wp*start - end
+         q = 2.0_wp*(start + end) - 4.0_wp*middle
+         leaves = margin(l)
+         working = min(middle, end, merge(min(4.0_wp*q*start - p*p, 0.0_wp), 0.0_wp, p < 0.0_wp .and. p + 2.0_wp*q > 0.0_wp))
+         back = merge(back, 1.0_wp, leaves < 0.0_wp)
+         working = merge(working, 1.0_wp, leaves < 0.0_wp)
+         borders(1)%flank(l) = merge(-1.0_wp, 1.0_wp, back < 0.0_wp)
+         borders(1)%begins(l) = merge(at_back, at_working, back < 0.0_wp)
+         borders(1)%beyond(l) = merge(back, working, back < 0.0_wp)
+         borders(2)%flank(l) = 1.0_wp
+         borders(2)%begins(l) = at_working
+         borders(2)%beyond(l) = merge(working, 1.0_wp, back < 0.0_wp)
+      end do
+   end subroutine find_borders
+
    !> Clearance to a border over a step, positive on the side on which the step begins.
-   pure subroutine set_clearance(rule, pitch, place, flank, side, x, gap)
-      !> Coefficients.
-      type(lane_rule), intent(in) :: rule
-      !> The mesh.
-      type(mesh_cycle), intent(in) :: pitch
-      !> Index of the start of the step in the cycle.
-      integer, intent(in) :: place
-      !> Border of each lane: 1 working flank, -1 back flank.
-      real(wp), intent(in) :: flank(lanes)
-      !> Branch at the start.
-      real(wp), intent(in) :: side(lanes)
+   pure subroutine set_clearance(half_backlash, base, border, x, gap)
+      !> Half of the backlash [m].
+      real(wp), intent(in) :: half_backlash
+      !> Mesh deflection at each point less g.q [m].
+      real(wp), intent(in) :: base(lanes, points)
+      !> The border.
+      type(border_type), intent(in) :: border
       !> g.q at each point [m].
       real(wp), intent(in) :: x(lanes, points)
       !> The clearance.
       type(parabola_type), intent(out) :: gap
 
-      real(wp) :: sign_of, start, middle, end
+      real(wp) :: towards, there, start, middle, end
       integer :: l
 
       do l = 1, lanes
-         sign_of = merge(1.0_wp, -1.0_wp, abs(side(l) - flank(l)) < 0.5_wp)
-         start = sign_of*(flank(l)*(rule%static(l) + pitch%error(place) + x(l, 1)) - pitch%half_backlash)
-         middle = sign_of*(flank(l)*(rule%static(l) + pitch%error(place + 1) + x(l, 2)) - pitch%half_backlash)
-         end = sign_of*(flank(l)*(rule%static(l) + pitch%error(place + 2) + x(l, 3)) - pitch%half_backlash)
-         gap%begins(l) = sign_of
+         towards = border%begins(l)*border%flank(l)
+         there = border%begins(l)*half_backlash
+         start = towards*(base(l, 1) + x(l, 1)) - there
+         middle = towards*(base(l, 2) + x(l, 2)) - there
+         end = towards*(base(l, 3) + x(l, 3)) - there
          gap%s(l) = start
          gap%p(l) = 4.0_wp*middle - 3.0_wp*start - end
          gap%q(l) = 2.0_wp*(start + end) - 4.0_wp*middle
@@ -149,62 +193,67 @@ contains
    end subroutine set_clearance
 
    !> The part of a step in which the deflection is beyond a border that it began before.
-   pure subroutine set_part(gap, beyond, from, until)
+   pure subroutine set_part(gap, beyond, from, length)
       !> Clearance.
       type(parabola_type), intent(in) :: gap
       !> Negative in the lanes that are beyond the border at all.
       real(wp), intent(in) :: beyond(lanes)
-      !> The part, as shares of the step; both 1 where there is none.
-      real(wp), intent(out) :: from(lanes), until(lanes)
+      !> Where the part begins, and how long it is, as shares of the step; 1 and 0 where there is none.
+      real(wp), intent(out) :: from(lanes), length(lanes)
 
-      real(wp) :: s, p, q, root, w, first, second, turn
+      real(wp) :: s, p, q, w, turn, end, first, outside
       integer :: l
 
       do l = 1, lanes
          s = gap%s(l)
          p = gap%p(l)
          q = gap%q(l)
-         root = p*p - 4.0_wp*q*s
-         w = -0.5_wp*(p + sign(sqrt(max(root, 0.0_wp)), p))
-         w = merge(w, 1.0_wp, abs(w) > no_curvature)
-         turn = w/merge(q, 1.0_wp, abs(q) > no_curvature)
-         first = merge(s/w, merge(turn, 1.0_wp, q < -no_curvature), p < 0.0_wp)
-         second = merge(turn, 1.0_wp, p < 0.0_wp .and. q > no_curvature)
-         first = merge(min(max(first, 0.0_wp), 1.0_wp), 1.0_wp, root > 0.0_wp .and. beyond(l) < 0.0_wp)
+         outside = beyond(l)
+         ! The roots s/w and w/q without cancellation: one after which the clearance is negative, one after which it is not, in
+         ! the order in which p and q say.
+         w = -0.5_wp*(p + sign(sqrt(max(p*p - 4.0_wp*q*s, 0.0_wp)) + no_clearance, p))
+         turn = w/(q + sign(no_clearance, q))
+         turn = min(merge(turn, 1.0_wp, turn > 0.0_wp), 1.0_wp)
+         first = merge(min(s/w, 1.0_wp), turn, p < 0.0_wp)
+         end = merge(turn, 1.0_wp, p < 0.0_wp)
+         first = merge(first, 1.0_wp, outside < 0.0_wp)
          from(l) = first
-         until(l) = max(min(second, 1.0_wp), first)
+         length(l) = max(end, first) - first
       end do
    end subroutine set_part
 
    !> How far the deflection of the lanes beyond a border turns between the points of the step.
-   pure subroutine reach(flank, half_backlash, gap, beyond, smallest, largest)
-      !> Border of each lane.
-      real(wp), intent(in) :: flank(lanes)
+   pure subroutine reach(border, half_backlash, gap, smallest, largest)
+      !> The border.
+      type(border_type), intent(in) :: border
       !> Half of the backlash [m].
       real(wp), intent(in) :: half_backlash
       !> Clearance.
       type(parabola_type), intent(in) :: gap
-      !> Negative in the lanes that are beyond the border.
-      real(wp), intent(in) :: beyond(lanes)
       !> Extremes of the mesh deflection so far [m].
       real(wp), intent(inout) :: smallest(lanes), largest(lanes)
 
-      real(wp) :: s, p, q, extreme
+      real(wp) :: s, p, q, flank, begins, outside, extreme, least, most
       integer :: l
 
       do l = 1, lanes
          s = gap%s(l)
          p = gap%p(l)
          q = gap%q(l)
-         extreme = merge(s - p*p/(4.0_wp*merge(q, 1.0_wp, abs(q) > no_curvature)), s, p < 0.0_wp .and. p + 2.0_wp*q > 0.0_wp)
-         extreme = flank(l)*(gap%begins(l)*extreme + half_backlash)
-         smallest(l) = merge(min(smallest(l), extreme), smallest(l), beyond(l) < 0.0_wp)
-         largest(l) = merge(max(largest(l), extreme), largest(l), beyond(l) < 0.0_wp)
+         extreme = merge(s - p*p/(4.0_wp*merge(q, 1.0_wp, abs(q) > no_clearance)), s, p < 0.0_wp .and. p + 2.0_wp*q > 0.0_wp)
+         flank = border%flank(l)
+         begins = border%begins(l)
+         outside = border%beyond(l)
+         extreme = flank*(begins*extreme + half_backlash)
+         least = merge(extreme, huge(1.0_wp), outside < 0.0_wp)
+         most = merge(extreme, -huge(1.0_wp), outside < 0.0_wp)
+         smallest(l) = min(smallest(l), least)
+         largest(l) = max(largest(l), most)
       end do
    end subroutine reach
 
    !> Add what the force at a border has too little, or take off what it has too much.
-   pure subroutine add_force(pitch, place, flank, gap, from, until, added)
+   pure subroutine add_force(pitch, place, flank, gap, from, length, rest, added)
       !> The mesh.
       type(mesh_cycle), intent(in) :: pitch
       !> Index of the start of the step in the cycle.
@@ -214,54 +263,58 @@ contains
       !> Clearance.
       type(parabola_type), intent(in) :: gap
       !> Part of the step.
-      real(wp), intent(in) :: from(lanes), until(lanes)
-      !> What is added to N [N].
+      real(wp), intent(in) :: from(lanes), length(lanes)
+      !> What there is of N without [N].
+      real(wp), intent(in) :: rest(lanes, points)
+      !> The same with what is added [N].
       real(wp), intent(inout) :: added(lanes, points)
 
-      real(wp) :: k, kp, kq, u, value, mean, tilt, bend
+      real(wp) :: k, kp, kq, u, value, first, second, third, mean, tilt, bend
       integer :: l, g
 
-      k = pitch%stiffness(place)
-      kp = 4.0_wp*pitch%stiffness(place + 1) - 3.0_wp*k - pitch%stiffness(place + 2)
-      kq = 2.0_wp*(k + pitch%stiffness(place + 2)) - 4.0_wp*pitch%stiffness(place + 1)
+      call stiffness_over_step(pitch, place, k, kp, kq)
       do l = 1, lanes
-         mean = 0.0_wp
-         tilt = 0.0_wp
-         bend = 0.0_wp
+         first = 0.0_wp
+         second = 0.0_wp
+         third = 0.0_wp
          do g = 1, gauss
-            u = from(l) + (until(l) - from(l))*gauss_place(g)
-            value = gauss_weight(g)*(until(l) - from(l))*(k + u*(kp + u*kq))*(gap%s(l) + u*(gap%p(l) + u*gap%q(l)))
-            mean = mean + value
-            tilt = tilt + 3.0_wp*value*(2.0_wp*u - 1.0_wp)
-            bend = bend + 5.0_wp*value*(1.0_wp - 6.0_wp*u*(1.0_wp - u))
+            u = from(l) + length(l)*gauss_place(g)
+            value = gauss_weight(g)*((k + u*(kp + u*kq))*(gap%s(l) + u*(gap%p(l) + u*gap%q(l))))
+            first = first + value
+            second = second + value*u
+            third = third + value*u*u
          end do
-         added(l, 1) = added(l, 1) - flank(l)*(mean - tilt + bend)
-         added(l, 2) = added(l, 2) - flank(l)*(mean - 0.5_wp*bend)
-         added(l, 3) = added(l, 3) - flank(l)*(mean + tilt + bend)
+         ! Moments by the Legendre polynomials on (0, 1), each with the square of its norm.
+         mean = length(l)*flank(l)*first
+         tilt = length(l)*flank(l)*(6.0_wp*second - 3.0_wp*first)
+         bend = length(l)*flank(l)*(5.0_wp*first - 30.0_wp*(second - third))
+         added(l, 1) = rest(l, 1) - (mean - tilt + bend)
+         added(l, 2) = rest(l, 2) - (mean - 0.5_wp*bend)
+         added(l, 3) = rest(l, 3) - (mean + tilt + bend)
       end do
    end subroutine add_force
 
    !> Derivative of what `add_force` adds by x at each point.
-   pure subroutine add_slope(pitch, place, gap, from, until, anew, slope)
+   pure subroutine add_slope(pitch, place, begins, gap, from, length, anew, slope)
       !> The mesh.
       type(mesh_cycle), intent(in) :: pitch
       !> Index of the start of the step in the cycle.
       integer, intent(in) :: place
+      !> 1 where the step begins in contact at the border, -1 where not.
+      real(wp), intent(in) :: begins(lanes)
       !> Clearance.
       type(parabola_type), intent(in) :: gap
       !> Part of the step.
-      real(wp), intent(in) :: from(lanes), until(lanes)
+      real(wp), intent(in) :: from(lanes), length(lanes)
       !> Nothing was added before.
       logical, intent(in) :: anew
       !> The derivative, added to.
       real(wp), intent(inout) :: slope(lanes, points, points)
 
-      real(wp) :: sums(points, points), row(points), column(points), k, kp, kq, u, value, tilt, bend
+      real(wp) :: sums(points, points), row(points), column(points), k, kp, kq, u, value
       integer :: l, g, i, j
 
-      k = pitch%stiffness(place)
-      kp = 4.0_wp*pitch%stiffness(place + 1) - 3.0_wp*k - pitch%stiffness(place + 2)
-      kq = 2.0_wp*(k + pitch%stiffness(place + 2)) - 4.0_wp*pitch%stiffness(place + 1)
+      call stiffness_over_step(pitch, place, k, kp, kq)
       do l = 1, lanes
          do j = 1, points
             do i = 1, points
@@ -269,15 +322,14 @@ contains
             end do
          end do
          do g = 1, gauss
-            u = from(l) + (until(l) - from(l))*gauss_place(g)
-            value = -gap%begins(l)*gauss_weight(g)*(until(l) - from(l))*(k + u*(kp + u*kq))
-            tilt = 3.0_wp*(2.0_wp*u - 1.0_wp)
-            bend = 5.0_wp*(1.0_wp - 6.0_wp*u*(1.0_wp - u))
-            row(1) = value*(1.0_wp - tilt + bend)
-            row(2) = value*(1.0_wp - 0.5_wp*bend)
-            row(3) = value*(1.0_wp + tilt + bend)
+            u = from(l) + length(l)*gauss_place(g)
+            value = -begins(l)*length(l)*(gauss_weight(g)*(k + u*(kp + u*kq)))
+            ! Sums of Legendre polynomials, as in `add_force`; Lagrange polynomials of the points.
+            row(1) = value*(9.0_wp + u*(30.0_wp*u - 36.0_wp))
+            row(2) = value*(15.0_wp*(u - u*u) - 1.5_wp)
+            row(3) = value*(3.0_wp + u*(30.0_wp*u - 24.0_wp))
             column(1) = (1.0_wp - 2.0_wp*u)*(1.0_wp - u)
-            column(2) = 4.0_wp*u*(1.0_wp - u)
+            column(2) = 4.0_wp*(u - u*u)
             column(3) = u*(2.0_wp*u - 1.0_wp)
             do j = 1, points
                do i = 1, points
@@ -292,5 +344,19 @@ contains
          end do
       end do
    end subroutine add_slope
+
+   !> Mesh stiffness over a step, k + kp u + kq u^2 with u from 0 to 1.
+   pure subroutine stiffness_over_step(pitch, place, k, kp, kq)
+      !> The mesh.
+      type(mesh_cycle), intent(in) :: pitch
+      !> Index of the start of the step in the cycle.
+      integer, intent(in) :: place
+      !> The coefficients [N/m].
+      real(wp), intent(out) :: k, kp, kq
+
+      k = pitch%stiffness(place)
+      kp = 4.0_wp*pitch%stiffness(place + 1) - 3.0_wp*k - pitch%stiffness(place + 2)
+      kq = 2.0_wp*(k + pitch%stiffness(place + 2)) - 4.0_wp*pitch%stiffness(place + 1)
+   end subroutine stiffness_over_step
 
 end module spurflex_integrate_lane_crossing

@@ -65,7 +65,7 @@ program time_kernels
    if (allocated(error)) call give_up(error%message)
 
    dust = 0.0_wp
-   allocate (kernels(16))
+   allocate (kernels(18))
    kernels(1)%what = peak_few
    kernels(1)%name = 'peak, few sums'
    kernels(2)%what = peak_many
@@ -87,6 +87,10 @@ program time_kernels
                    5700.0_wp, 1.0e9_wp)
    call new_kernel(kernels(15), 'collocation, tangents', tangents_collocation, support_flexible, 1500.0_wp, 10.0_wp**7.7_wp)
    call new_kernel(kernels(16), 'collocation, tangents, rigid', tangents_collocation, support_rigid, 1500.0_wp, 0.0_wp)
+   call new_kernel(kernels(17), 'collocation, flexible, quasi-periodic, 16 steps', period_collocation, support_flexible, &
+                   4885.0_wp, 1.0e5_wp, 16)
+   call new_kernel(kernels(18), 'collocation, flexible, with derivatives, quasi-periodic, 16 steps', gain_collocation, &
+                   support_flexible, 4885.0_wp, 1.0e5_wp, 16)
    do i = 1, size(kernels)
       call choose_rounds(kernels(i), wanted)
       allocate (kernels(i)%seconds(repeats))
