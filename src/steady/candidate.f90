@@ -23,7 +23,7 @@ module spurflex_steady_candidate
    real(wp), parameter :: repeats_more_nearly = 0.8_wp
 
    !> Distance between sections, beside the size of the motion, at which the shortest period is tried; a longer one must come
-   !> nearer by a factor.
+   !> nearer by a factor, one of more than three mesh periods by another.
    real(wp), parameter :: near_recurrence = 0.1_wp, clearly_nearer = 0.3_wp, much_clearer = 0.1_wp
 
    !> Distance, beside the size of the motion, that is none: a shorter period is exact.
@@ -35,8 +35,12 @@ module spurflex_steady_candidate
    integer, parameter :: long_wait = 768
 
    !> Near a periodic motion Newton's method leads to it, also with a multiple of its period, unless the transient repeats itself
-   !> more nearly than this share of its distance.
-   real(wp), parameter :: lies_apart = 0.2_wp
+   !> more nearly than this share of its distance; the second share with a period of more than three mesh periods.
+   real(wp), parameter :: lies_apart = 0.2_wp, lies_far_apart = 0.1_wp
+
+   !> Mesh periods up to which a motion is soon told from a spiral or a torus. What winds around a motion about once in four mesh
+   !> periods comes back near after four, and with that period Newton's method leads to the motion in the middle.
+   integer, parameter :: soon_told = 3
 
    !> Mesh periods up to which these rules hold: who has waited so long looks again.
    integer, parameter :: trusted = 512
@@ -107,7 +111,7 @@ contains
       short = 0
       do k = 1, longest_period
          if (distances(periods) <= no_distance*scale) exit
-         if (distances(k) < clearly_nearer*distances(periods)) periods = k
+         if (distances(k) < merge(clearly_nearer, much_clearer, k <= soon_told)*distances(periods)) periods = k
          if (short > 0 .or. periods > longest_named) cycle
          if (distances(periods) <= near_recurrence*scale .and. is_new(periods)) short = periods
       end do
@@ -126,7 +130,8 @@ contains
       before = self%distance
       self%distance = weighted_norm(weight, transient%state - self%orbit%state)
       if (self%is_stable .and. self%distance <= merge(nearer, much_nearer, periods == self%orbit%periods)*before) periods = 0
-      if (periods > 0 .and. mod(periods, self%orbit%periods) == 0 .and. recurrence > lies_apart*self%distance) periods = 0
+      if (periods > 0 .and. mod(periods, self%orbit%periods) == 0 .and. &
+          recurrence > merge(lies_apart, lies_far_apart, periods <= soon_told)*self%distance) periods = 0
 
    contains
 
