@@ -1,4 +1,7 @@
-!> Largest Lyapunov exponent of a motion from one tangent, with its standard error from the spread over blocks.
+!> Largest Lyapunov exponent of a motion from one tangent: as a mean with its standard error from the spread over blocks, and as a
+!> weighted mean with weights that vanish smoothly at both ends. Of a growth that only wanders, as on a torus, the weighted mean
+!> comes to zero faster than any power of the periods but for the smoothness of the weights (Das, Saiki, Sander, Yorke:
+!> Quantitative quasiperiodicity, Nonlinearity 30 (2017) 4111); of a chaotic one it is no better than the other.
 !>
 !> The mesh force is continuous, so that a tangent crosses the borders of the contact without a jump of its own.
 module spurflex_steady_lyapunov
@@ -18,6 +21,9 @@ module spurflex_steady_lyapunov
    !> within the blocks and does not count as an error of the exponent.
    integer, parameter :: most_blocks = 32
 
+   !> Weighted means: over all that is planned, over its first and over its second half.
+   integer, parameter :: spans = 3
+
    !> Growth of a tangent, block by block.
    type :: lyapunov_sum
       private
@@ -27,6 +33,10 @@ module spurflex_steady_lyapunov
       !> Closed blocks, and growth over each.
       integer :: blocks = 0
       real(wp) :: growth(most_blocks) = 0.0_wp
+      !> Mesh periods planned, and seen so far.
+      integer :: planned = 0, seen = 0
+      !> Sums of the weights and of the weighted growth: all, first half, second half.
+      real(wp), dimension(spans) :: weights = 0.0_wp, weighted = 0.0_wp
    contains
       !> Begin anew.
       procedure :: reset
@@ -34,15 +44,23 @@ module spurflex_steady_lyapunov
       procedure :: add
       !> Exponent and its standard error.
       procedure :: exponent => mean_growth
+      !> The same as a weighted mean.
+      procedure :: smooth_exponent => weighted_growth
    end type lyapunov_sum
 
 contains
 
    !> Begin anew.
-   pure subroutine reset(self)
+   pure subroutine reset(self, planned)
       !> Sum.
       class(lyapunov_sum), intent(inout) :: self
+      !> Mesh periods over which the growth will be summed.
+      integer, intent(in) :: planned
 
+      self%planned = planned
+      self%seen = 0
+      self%weights = 0.0_wp
+      self%weighted = 0.0_wp
       self%length = first_length
       self%periods = 0
       self%open = 0.0_wp
@@ -56,7 +74,16 @@ contains
       !> Norm of the tangent over that of a period ago.
       real(wp), intent(in) :: growth
 
-      self%open = self%open + log(max(growth, tiny(1.0_wp)))
+      real(wp) :: logarithm, place
+      integer :: half
+
+      logarithm = log(max(growth, tiny(1.0_wp)))
+      place = (real(self%seen, wp) + 0.5_wp)/real(max(self%planned, 1), wp)
+      self%seen = self%seen + 1
+      call weigh(place, logarithm, self%weights(1), self%weighted(1))
+      half = merge(2, 3, place < 0.5_wp)
+      call weigh(2.0_wp*place - merge(0.0_wp, 1.0_wp, place < 0.5_wp), logarithm, self%weights(half), self%weighted(half))
+      self%open = self%open + logarithm
       self%periods = self%periods + 1
       if (self%periods < self%length) return
       self%blocks = self%blocks + 1
@@ -68,6 +95,40 @@ contains
       self%blocks = most_blocks/2
       self%length = 2*self%length
    end subroutine add
+
+   !> Add the growth over a period to a weighted mean.
+   pure subroutine weigh(place, logarithm, weight, weighted)
+      !> Place of the period in what the mean is over, from 0 to 1.
+      real(wp), intent(in) :: place
+      !> Logarithm of the growth.
+      real(wp), intent(in) :: logarithm
+      !> Sum of the weights, and of the weighted growth.
+      real(wp), intent(inout) :: weight, weighted
+
+      real(wp) :: here
+
+      here = max(place*(1.0_wp - place), 0.0_wp)**4
+      weight = weight + here
+      weighted = weighted + here*logarithm
+   end subroutine weigh
+
+   !> Exponent as a weighted mean, and half of what those of the two halves differ by; unknown before all that
+   !> was planned is seen. What comes after does not count.
+   pure subroutine weighted_growth(self, exponent, error)
+      !> Sum.
+      class(lyapunov_sum), intent(in) :: self
+      !> Largest Lyapunov exponent [1/mesh period], and its error.
+      real(wp), intent(out) :: exponent, error
+
+      real(wp) :: means(spans)
+
+      exponent = 0.0_wp
+      error = unknown
+      if (self%planned < 2 .or. self%seen < self%planned) return
+      means = self%weighted/self%weights
+      exponent = means(1)
+      error = 0.5_wp*abs(means(3) - means(2))
+   end subroutine weighted_growth
 
    !> Exponent and its standard error; the error is `unknown` before there are two blocks.
    pure subroutine mean_growth(self, exponent, error, periods, wander)

@@ -11,12 +11,13 @@ module spurflex_steady_search
    use spurflex_integrate_options, only: solver_options
    use spurflex_integrate_period_map, only: period_map
    use spurflex_steady_candidate, only: candidate_type
+   use spurflex_steady_lyapunov, only: unknown
    use spurflex_steady_outcome, only: steady_motion, status_missing, status_settled, status_not_settled, status_diverged, &
       reason_non_finite, reason_max_periods, motion_unresolved, motion_quasi_periodic, motion_chaotic, motion_of_periods
    use spurflex_steady_sections, only: weighted_norm
    use spurflex_steady_orbit, only: periodic_orbit, move_orbit, contact_is_kept
    use spurflex_steady_stability, only: find_stable_orbits, largest_multiplier
-   use spurflex_steady_transient, only: transient_type, begin_transient, watch_from_now, advance_transients, drifts
+   use spurflex_steady_transient, only: transient_type, begin_transient, watch_from_now, advance_transients, drift
    implicit none
    private
 
@@ -50,8 +51,18 @@ module spurflex_steady_search
    !> Share of the last watch that counts as all of it: blocks of growth that are not full are left out.
    real(wp), parameter :: whole_watch = 0.9_wp
 
-   !> Mesh periods over which a motion that is called quasi-periodic must have been watched.
-   integer, parameter :: fewest_periods = 512
+   !> Mesh periods over which a motion that is called quasi-periodic or chaotic must have been watched; fewer if it is plainly
+   !> quasi-periodic.
+   integer, parameter :: fewest_periods = 512, fewest_if_plain = 384
+
+   !> Weighted mean of the growth that is none, whatever the periods: on the tori of the paper's gears it is some 1e-4 after 768.
+   real(wp), parameter :: no_growth = 2.0e-3_wp
+
+   !> Drift of a motion that has arrived; of one that cannot be watched any longer; of one that has been watched over fewer periods.
+   real(wp), parameter :: arrived_drift = 0.025_wp, last_drift = 0.05_wp, plain_drift = 0.002_wp
+
+   !> Drift from which a motion hardly arrives within the next few hundred periods.
+   real(wp), parameter :: far_drift = 0.1_wp
 
 contains
 
@@ -115,8 +126,11 @@ contains
             until = merge(options%max_periods, next_look, 2*next_look > options%max_periods)
             do i = 1, size(left)
                ! A tangent is worth while in a watch that can decide on the class.
-               call watch_from_now(transients(left(i)), until, grows=until - next_look/2 >= fewest_periods)
+               call watch_from_now(transients(left(i)), until, grows=until - next_look/2 >= &
+                                   merge(fewest_periods, fewest_if_plain, drift(transients(left(i))) > far_drift))
             end do
+            ! Those with tangents first: lanes without need not wait for lanes with.
+            left = [pack(left, transients(left)%grows), pack(left, .not. transients(left)%grows)]
          end if
          call advance_transients(points, left, spread(min(next_look, options%max_periods), 1, size(left)), transients, visitor)
          next_look = 2*next_look
@@ -351,7 +365,7 @@ contains
    !> The class of a motion in which nothing periodic was found; its status remains `status_missing` where it cannot be told.
    !>
    !> Whatever the periods watched, an exponent is called zero to the same resolution, that of the last watch: a tangent whose
-   !> growth wanders less than that in a shorter watch need not be watched longer.
+   !> growth wanders less than that in a shorter watch need not be watched longer. Nor need one whose weighted growth vanishes.
    pure subroutine classify(transient, most_periods, motion)
       !> The transient.
       type(transient_type), intent(in) :: transient
@@ -360,20 +374,32 @@ contains
       !> The motion.
       type(steady_motion), intent(inout) :: motion
 
-      real(wp) :: neutral, wander
+      real(wp) :: neutral, wander, smooth, smooth_error, still
       integer :: periods
+      logical :: at_last, vanishes
 
       call transient%growth%exponent(motion%lyapunov_exponent, motion%lyapunov_error, periods, wander)
-      if (periods < fewest_periods) return
+      if (periods < fewest_if_plain) return
+      call transient%growth%smooth_exponent(smooth, smooth_error)
+      vanishes = smooth_error < unknown .and. abs(smooth) <= no_growth
+      at_last = transient%periods >= most_periods
+      still = merge(last_drift, merge(arrived_drift, plain_drift, periods >= fewest_periods), at_last)
       neutral = neutral_growth/real(max(periods, 1), wp)
-      if (motion%lyapunov_exponent > neutral + significance*motion%lyapunov_error) then
-         motion%motion = motion_chaotic
-         if (transient%periods >= most_periods) motion%status = status_settled
-      else if (wander <= neutral_growth*min(real(periods, wp)/(whole_watch*real(last_watch(most_periods), wp)), 1.0_wp) &
-               .and. .not. drifts(transient, at_last=transient%periods >= most_periods)) then
-         motion%motion = motion_quasi_periodic
-         motion%status = status_settled
+      if (periods >= fewest_periods) then
+         if (motion%lyapunov_exponent > neutral + significance*motion%lyapunov_error) then
+            motion%motion = motion_chaotic
+            if (at_last) motion%status = status_settled
+            return
+         end if
+         vanishes = vanishes .or. &
+                    wander <= neutral_growth*min(real(periods, wp)/(whole_watch*real(last_watch(most_periods), wp)), 1.0_wp)
       end if
+      if (.not. vanishes .or. drift(transient) > still) return
+      motion%motion = motion_quasi_periodic
+      motion%status = status_settled
+      if (smooth_error >= unknown) return
+      motion%lyapunov_exponent = smooth
+      motion%lyapunov_error = smooth_error
    end subroutine classify
 
 end module spurflex_steady_search

@@ -8,13 +8,10 @@ module spurflex_steady_transient
    implicit none
    private
 
-   public :: transient_type, begin_transient, watch_from_now, advance_transients, drifts
+   public :: transient_type, begin_transient, watch_from_now, advance_transients, drift
 
    !> A state of this norm has left every physical range; far below overflow [m].
    real(wp), parameter :: diverged_norm = 1.0e100_wp
-
-   !> Relative difference of the ranges of two halves of a motion that has arrived; of one that cannot be watched any longer.
-   real(wp), parameter :: same_range = 0.025_wp, same_range_at_last = 0.05_wp
 
    !> A transient under way.
    type :: transient_type
@@ -67,7 +64,7 @@ contains
 
       real(wp) :: direction(size(transient%state))
 
-      call transient%growth%reset()
+      call transient%growth%reset(until - transient%periods)
       transient%low = huge(1.0_wp)
       transient%high = -huge(1.0_wp)
       transient%half = (transient%periods + until)/2
@@ -175,19 +172,19 @@ contains
       transient%high(which) = max(transient%high(which), norm)
    end subroutine see_section
 
-   !> A motion is still on its way: its sections range over more, or less, in the second half than in the first.
-   pure function drifts(transient, at_last) result(it_does)
+   !> How far a motion is still on its way: by how much its sections range over more, or less, in the second half of what has been
+   !> watched than in the first, beside the larger range.
+   pure function drift(transient) result(change)
       !> The transient.
       type(transient_type), intent(in) :: transient
-      !> It cannot be watched any longer.
-      logical, intent(in) :: at_last
-      !> It is.
-      logical :: it_does
+      !> The change; 1 while only one half has been seen.
+      real(wp) :: change
 
       real(wp) :: range(2)
 
-      range = max(transient%high - transient%low, 0.0_wp)
-      it_does = abs(range(2) - range(1)) > merge(same_range_at_last, same_range, at_last)*maxval(range)
-   end function drifts
+      ! Of what has not been seen, the lowest is huge and the highest is less.
+      range = max(transient%high, transient%low) - transient%low
+      change = abs(range(2) - range(1))/max(maxval(range), tiny(1.0_wp))
+   end function drift
 
 end module spurflex_steady_transient

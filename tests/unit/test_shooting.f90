@@ -6,13 +6,13 @@ module test_shooting
    use pseudo_random, only: random_stream
    use spurflex_base_attendant, only: no_attendant
    use spurflex_base_error, only: library_error => error_type
-   use spurflex_base_kinds, only: wp
+   use spurflex_base_kinds, only: wp, pi
    use spurflex_base_text, only: to_text
    use spurflex_integrate_collocation, only: collocation_map
    use spurflex_integrate_options, only: integrator_collocation
    use spurflex_integrate_period_map, only: period_map
    use spurflex_model_equations, only: equations_type, new_equations
-   use spurflex_steady_lyapunov, only: lyapunov_sum
+   use spurflex_steady_lyapunov, only: lyapunov_sum, unknown
    use spurflex_steady_sections, only: weighted_norm
    use spurflex_steady_orbit, only: floquet_multipliers, periodic_orbit
    use spurflex_steady_shooting, only: advance_periods, find_orbit
@@ -45,6 +45,7 @@ contains
                   new_unittest('onset of 2T, rigid support', test_onset_rigid), &
                   new_unittest('onset of 2T, flexible support', test_onset_flexible), &
                   new_unittest('exponent of a periodic motion', test_exponent), &
+                  new_unittest('exponent of a growth that wanders', test_wandering), &
                   new_unittest('nothing is found far from any motion', test_hopeless) &
                   ]
    end subroutine collect_shooting
@@ -453,7 +454,7 @@ contains
          if (allocated(error)) return
          state = orbit%state
          tangent = spread([(1.0_wp/map%weight(k), k=1, map%size)], 1, 1)
-         call growth%reset()
+         call growth%reset(summed)
          do k = 1, settling + summed
             call map%advance(state, tangent)
             if (k > settling) call growth%add(weighted_norm(map%weight, tangent(1, :)))
@@ -467,6 +468,41 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_exponent
+
+   !> On a torus the logarithm of a tangent only wanders, here by a cosine of the golden mean: its weighted mean tells the rate that
+   !> is added to it, to many digits more than the mean does, once all that was planned is seen.
+   subroutine test_wandering(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer, parameter :: planned = 384, late = 3
+      real(wp), parameter :: rates(3) = [0.0_wp, 0.01_wp, -0.02_wp], half_range = 2.0_wp, tolerance = 1.0e-8_wp
+      real(wp), parameter :: turn = 2.0_wp*pi*(sqrt(5.0_wp) - 1.0_wp)/2.0_wp
+      type(lyapunov_sum) :: growth
+      real(wp) :: exponent, exponent_error, wander
+      integer :: i, k, periods
+
+      do i = 1, size(rates)
+         call growth%reset(planned)
+         do k = 1, planned + late
+            call growth%add(exp(rates(i) + half_range*(cos(turn*real(k, wp)) - cos(turn*real(k - 1, wp)))))
+            if (k /= planned - 1) cycle
+            call growth%smooth_exponent(exponent, exponent_error)
+            call check(error, exponent_error >= unknown, 'unknown before the end')
+            if (allocated(error)) return
+         end do
+         call growth%smooth_exponent(exponent, exponent_error)
+         call check(error, exponent, rates(i), tolerance, 'weighted mean')
+         if (allocated(error)) return
+         call check(error, exponent_error, 0.0_wp, tolerance, 'its error')
+         if (allocated(error)) return
+         call growth%exponent(exponent, exponent_error, periods, wander)
+         call check(error, exponent, rates(i), 2.0_wp*half_range/real(planned, wp), 'mean')
+         if (allocated(error)) return
+         call check(error, wander <= 2.0_wp*half_range + abs(rates(i))*real(planned + late, wp), 'range of the growth')
+         if (allocated(error)) return
+      end do
+   end subroutine test_wandering
 
    !> A start that is no motion at all, far out, ends without one or with one that is fixed; never with nonsense.
    subroutine test_hopeless(error)
