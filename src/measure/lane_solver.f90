@@ -2,19 +2,18 @@
 !> and the difference is the error estimate. Those that keep contact are measured by their Fourier series instead.
 module spurflex_measure_lane_solver
    use spurflex_base_attendant, only: attendant
-   use spurflex_base_error, only: error_type
    use spurflex_base_kinds, only: wp
    use spurflex_integrate_lane_ensemble, only: lane_ensemble
-   use spurflex_integrate_lane_observe, only: point_view, new_point_view, lane_view
+   use spurflex_integrate_lane_observe, only: lane_view
    use spurflex_integrate_options, only: solver_options, integrator_newmark
    use spurflex_integrate_steps, only: aim, judge_share, better_lane_steps, newmark_lane_steps
    use spurflex_measure_harmonic_motion, only: series_sampler
    use spurflex_measure_lane_motion, only: measure_lanes, quarter_of, parts, begin_of_window, first_half, second_half
+   use spurflex_measure_linear_parts, only: linear_parts
    use spurflex_measure_linear_points, only: harmonics_do, measure_linear
    use spurflex_measure_response, only: response, empty_response, describe_motion, relative_difference, status_inaccurate, &
       reason_given_steps
    use spurflex_model_equations, only: equations_type
-   use spurflex_model_modal, only: modal_system, new_modal_system, same_modes
    use spurflex_steady_outcome, only: steady_motion
    use spurflex_steady_search, only: describe_orbit
    use spurflex_steady_sections, only: weighted_norm
@@ -24,89 +23,36 @@ module spurflex_measure_lane_solver
    implicit none
    private
 
-   public :: lane_solver, forget_parts, find_part, measure_orbits, measure_windows
-
-   !> Linear parts that are kept for tiles to come; a few kilobytes each.
-   integer, parameter :: most_parts = 256
+   public :: lane_solver, measure_orbits, measure_windows
 
    !> Points in lanes.
    type :: lane_solver
       !> Options.
       type(solver_options) :: options
-      !> The points, and those that judge them.
-      type(lane_ensemble) :: points, judge
+      !> The points as they are searched for, as they are measured, and those that judge them.
+      type(lane_ensemble) :: seekers, points, judge
       !> Steps per mesh period with which collocation finds the motion; the judge takes more than twice as many.
       integer :: steps = 0
       !> Room for what the lanes see.
       type(lane_view) :: view
       !> Samples the series of motions that keep contact.
       type(series_sampler) :: sampler
-      !> Linear parts met so far, with their modes and displacements.
-      integer :: parts = 0
-      type(equations_type), allocatable :: linear(:)
-      type(modal_system), allocatable :: modal(:)
-      type(point_view), allocatable :: views(:)
+      !> Linear parts met so far.
+      type(linear_parts) :: parts
    contains
       procedure :: by_newmark
    end type lane_solver
 
 contains
 
-   !> Forget the linear parts met so far if they are many. To be called between tiles.
-   pure subroutine forget_parts(solver)
-      !> Solver.
-      type(lane_solver), intent(inout) :: solver
-
-      if (solver%parts > most_parts) solver%parts = 0
-   end subroutine forget_parts
-
-   !> Which of the linear parts met so far is that of a point; a new one is added to them.
-   subroutine find_part(solver, equations, part)
-      !> Solver.
-      type(lane_solver), intent(inout) :: solver
-      !> Equations of motion of the point.
-      type(equations_type), intent(in) :: equations
-      !> Index of the part; 0 where its modes cannot be found.
-      integer, intent(out) :: part
-
-      type(equations_type), allocatable :: linear(:)
-      type(modal_system), allocatable :: modal(:)
-      type(point_view), allocatable :: views(:)
-      type(modal_system) :: found
-      type(error_type), allocatable :: error
-
-      ! The latest first: neighbours come after each other.
-      do part = solver%parts, 1, -1
-         if (same_modes(solver%linear(part), equations)) return
-      end do
-      part = 0
-      call new_modal_system(equations, found, error)
-      if (allocated(error)) return
-      if (.not. allocated(solver%linear)) allocate (solver%linear(0), solver%modal(0), solver%views(0))
-      if (solver%parts == size(solver%linear)) then
-         allocate (linear(2*solver%parts + 8), modal(2*solver%parts + 8), views(2*solver%parts + 8))
-         linear(:solver%parts) = solver%linear(:solver%parts)
-         modal(:solver%parts) = solver%modal(:solver%parts)
-         views(:solver%parts) = solver%views(:solver%parts)
-         call move_alloc(linear, solver%linear)
-         call move_alloc(modal, solver%modal)
-         call move_alloc(views, solver%views)
-      end if
-      solver%parts = solver%parts + 1
-      part = solver%parts
-      solver%linear(part) = equations
-      solver%modal(part) = found
-      solver%views(part) = new_point_view(found)
-   end subroutine find_part
-
    !> Measure periodic motions, with more and more steps where the tolerance asks for them.
-   subroutine measure_orbits(solver, equations, part, members, visitor, motions, orbits, answers, complete)
+   subroutine measure_orbits(solver, equations, part, few, members, visitor, motions, orbits, answers, complete)
       !> Solver, its points loaded.
       type(lane_solver), intent(inout) :: solver
       !> Equations of motion of each point, shape (n).
       type(equations_type), intent(in) :: equations(:)
-      !> Linear part of each point, shape (n).
-      integer, intent(in) :: part(:)
+      !> Linear part of each point, and what the mesh was taken to feel of it in the search, shape (n).
+      integer, intent(in) :: part(:), few(:)
       !> Which of them.
       integer, intent(in) :: members(:)
       !> Let in now and then.
@@ -122,26 +68,30 @@ contains
 
       integer :: steps(size(equations)), found_by(size(equations)), next, i
       integer, allocatable :: open(:), group(:)
-      logical :: agreed(size(equations))
+      logical :: agreed(size(equations)), is_whole(size(equations))
 
-      if (harmonics_do(solver%options)) call measure_linear(solver%points, solver%sampler, solver%modal, solver%options%tolerance, &
-                                                            equations, part, members, motions, orbits, answers, complete)
+      if (harmonics_do(solver%options)) call measure_linear(solver%parts, solver%sampler, solver%options, equations, part, few, &
+                                                            members, motions, orbits, answers, complete)
       open = pack(members, .not. complete(members))
       do i = 1, size(equations)
          steps(i) = measuring_steps(solver, equations(i))
       end do
-      ! Steps that found the orbits; free steps of Newmark's method did not.
+      ! Steps that found the orbits; free steps of Newmark's method did not, and the search leaves out multipliers.
       found_by = steps
-      if (solver%by_newmark() .and. solver%options%steps_per_period == 0) found_by = 0
+      if (solver%options%steps_per_period == 0 .and. (solver%by_newmark() .or. solver%options%multipliers)) found_by = 0
+      do i = 1, size(members)
+         is_whole(members(i)) = all(solver%parts%truncation(few(members(i)))%felt)
+      end do
       do while (size(open) > 0)
          next = minval(steps(open))
          group = pack(open, steps(open) == next)
          agreed(group) = .true.
-         if (next /= solver%points%steps .or. (solver%by_newmark() .neqv. solver%points%by_newmark)) then
-            solver%points%by_newmark = solver%by_newmark()
-            call solver%points%load(equations, solver%modal, part, next, group)
-         end if
-         if (any(found_by(group) /= next)) call find_again(solver, group, visitor, motions, orbits, agreed)
+         solver%points%by_newmark = solver%by_newmark()
+         call solver%points%load(equations, solver%parts%modal, part, next, group)
+         call find_again(solver, pack(group, found_by(group) /= next), visitor, motions, orbits, agreed, only_follow=.false.)
+         call find_again(solver, pack(group, found_by(group) == next .and. .not. is_whole(group)), visitor, motions, orbits, &
+                         agreed, only_follow=.true.)
+         is_whole(group) = .true.
          call judge_orbits(solver, equations, part, pack(group, agreed(group)), visitor, motions, orbits, answers, agreed)
          do i = 1, size(group)
             associate (p => group(i), error => answers(group(i))%error_estimate)
@@ -187,8 +137,8 @@ contains
       if (solver%options%steps_per_period == 0 .and. solver%by_newmark()) steps = newmark_lane_steps(equations)
    end function measuring_steps
 
-   !> Find orbits again with other steps.
-   subroutine find_again(solver, members, visitor, motions, orbits, found)
+   !> Find orbits again with other steps, or in all modes.
+   subroutine find_again(solver, members, visitor, motions, orbits, found, only_follow)
       !> Solver, its points loaded with the other steps.
       type(lane_solver), intent(inout) :: solver
       !> Which of the points.
@@ -201,13 +151,21 @@ contains
       type(periodic_orbit), intent(inout) :: orbits(:)
       !> The orbit is there.
       logical, intent(inout) :: found(:)
+      !> It is known to be stable, and its monodromy is near enough.
+      logical, intent(in) :: only_follow
 
       type(periodic_orbit) :: again(size(members))
       logical :: is_found(size(members))
       integer :: i
 
+      if (size(members) == 0) return
       again = orbits(members)
-      call follow_orbits(solver%points, members, sizes(solver%points, members, again), visitor, again, is_found)
+      if (only_follow) then
+         call find_orbits(solver%points, members, sizes(solver%points, members, again), visitor, again, is_found, &
+                          monodromy_is_near=.true., roughly=.true., near_enough=judge_share*solver%options%tolerance)
+      else
+         call follow_orbits(solver%points, members, sizes(solver%points, members, again), visitor, again, is_found)
+      end if
       do i = 1, size(members)
          associate (motion => motions(members(i)))
             motion%periods_integrated = motion%periods_integrated + again(i)%integrated
@@ -254,8 +212,8 @@ contains
       do i = 1, size(members)
          states(:, i) = judged(i)%state
       end do
-      call measure_lanes(solver%points, equations, solver%views, part, solver%view, members, judged%periods, visitor, states, &
-                         measured)
+      call measure_lanes(solver%points, equations, solver%parts%views, part, solver%view, members, judged%periods, visitor, &
+                         states, measured)
       call find_orbits(solver%judge, members, sizes(solver%points, members, judged), visitor, judged, found, &
                        monodromy_is_near=.true., roughly=.true., near_enough=judge_share*solver%options%tolerance)
       ! Large steps can split a motion in two where the teeth graze.
@@ -264,11 +222,11 @@ contains
       do i = 1, size(members)
          states(:, i) = judged(i)%state
       end do
-      call measure_lanes(solver%judge, equations, solver%views, part, solver%view, members, judged%periods, visitor, states, &
+      call measure_lanes(solver%judge, equations, solver%parts%views, part, solver%view, members, judged%periods, visitor, states, &
                          judgement)
       do i = 1, size(members)
          measured(i)%error_estimate = max(relative_difference(equations(members(i)), measured(i), judgement(i)), &
-                                          solver%modal(part(members(i)))%roundoff)
+                                          solver%parts%modal(part(members(i)))%roundoff)
          motions(members(i))%periods_integrated = motions(members(i))%periods_integrated + judged(i)%integrated
       end do
       agreed(members) = found
@@ -287,7 +245,7 @@ contains
       integer, intent(in) :: members(:)
 
       ! One more than twice as many: where the grids nest, a crossing can leave both with the same part of a step behind it.
-      call solver%judge%load(equations, solver%modal, part, &
+      call solver%judge%load(equations, solver%parts%modal, part, &
                              2*merge(solver%steps, solver%points%steps, solver%by_newmark()) + 1, members)
    end subroutine load_judge
 
@@ -339,7 +297,7 @@ contains
       do i = 1, size(members)
          if (any(steps(members(:i - 1)) == steps(members(i)))) cycle
          solver%points%by_newmark = solver%by_newmark()
-         call solver%points%load(equations, solver%modal, part, steps(members(i)))
+         call solver%points%load(equations, solver%parts%modal, part, steps(members(i)))
          group = pack(members, steps(members) == steps(members(i)))
          call load_judge(solver, equations, part, group)
          call measure_group(group)
@@ -366,10 +324,10 @@ contains
             states(:, k) = motions(group(k))%state
          end do
          judged = states
-         call measure_lanes(solver%judge, equations, solver%views, part, solver%view, group, quarter_of(periods), visitor, &
+         call measure_lanes(solver%judge, equations, solver%parts%views, part, solver%view, group, quarter_of(periods), visitor, &
                             judged, judgement)
-         call measure_lanes(solver%points, equations, solver%views, part, solver%view, group, periods, visitor, states, whole, &
-                            of_parts)
+         call measure_lanes(solver%points, equations, solver%parts%views, part, solver%view, group, periods, visitor, states, &
+                            whole, of_parts)
          do k = 1, size(group)
             associate (p => group(k))
                whole(k)%error_estimate = max(relative_difference(equations(p), of_parts(first_half, k), of_parts(second_half, k)), &

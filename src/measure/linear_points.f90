@@ -1,16 +1,17 @@
 !> Points whose teeth never part: the motion that the lanes have found is replaced by its Fourier series, and measured there.
 module spurflex_measure_linear_points
    use spurflex_base_kinds, only: wp
-   use spurflex_integrate_lane_ensemble, only: lane_ensemble, widen
+   use spurflex_integrate_lane_ensemble, only: widen, narrow
    use spurflex_integrate_options, only: solver_options, integrator_collocation
    use spurflex_integrate_steps, only: aim
    use spurflex_measure_harmonic_motion, only: series_sampler, measure_harmonics
    use spurflex_measure_response, only: response, empty_response, describe_motion, contact_kept
    use spurflex_model_equations, only: equations_type
-   use spurflex_model_modal, only: modal_system
+   use spurflex_measure_linear_parts, only: linear_parts
    use spurflex_steady_harmonic, only: harmonic_motion, find_harmonic_motion, section_of
    use spurflex_steady_orbit, only: periodic_orbit, contact_is_kept
    use spurflex_steady_outcome, only: steady_motion
+   use spurflex_steady_search, only: describe_orbit
    use spurflex_steady_sections, only: weighted_norm
    implicit none
    private
@@ -33,19 +34,17 @@ contains
    end function harmonics_do
 
    !> Measure the motions that keep contact by their Fourier series.
-   subroutine measure_linear(points, sampler, modals, tolerance, equations, part, members, motions, orbits, answers, complete)
-      !> The points.
-      type(lane_ensemble), intent(in) :: points
+   subroutine measure_linear(parts, sampler, options, equations, part, few, members, motions, orbits, answers, complete)
+      !> Linear parts.
+      type(linear_parts), intent(in) :: parts
       !> Samples their series.
       type(series_sampler), intent(inout) :: sampler
-      !> Modes of the linear parts that there are.
-      type(modal_system), intent(in) :: modals(:)
-      !> Relative error of the amplitude that is asked for.
-      real(wp), intent(in) :: tolerance
+      !> Tolerance, and whether multipliers are asked for.
+      type(solver_options), intent(in) :: options
       !> Equations of motion of each point, shape (n).
       type(equations_type), intent(in) :: equations(:)
-      !> Linear part of each point, shape (n).
-      integer, intent(in) :: part(:)
+      !> Linear part of each point, and what the mesh was taken to feel of it in the search, shape (n).
+      integer, intent(in) :: part(:), few(:)
       !> Which of them.
       integer, intent(in) :: members(:)
       !> The motions; those measured move to the section of the series, shape (n).
@@ -59,24 +58,28 @@ contains
 
       type(harmonic_motion) :: series
       type(response) :: measured
-      real(wp) :: section(points%size)
-      integer :: i
+      real(wp), allocatable :: section(:), known(:)
+      integer :: room, i
 
       do i = 1, size(members)
-         associate (p => members(i), modal => modals(part(members(i))))
-            if (motions(p)%periods /= 1 .or. .not. contact_is_kept(points%half_backlash, orbits(p))) cycle
+         associate (p => members(i), modal => parts%modal(part(members(i))), felt => parts%truncation(few(members(i)))%felt)
+            if (motions(p)%periods /= 1 .or. .not. contact_is_kept(equations(p)%mesh%half_backlash, orbits(p))) cycle
             call find_harmonic_motion(modal, equations(p), series)
             if (series%order == 0) cycle
-            section = widen(section_of(modal, series), points%size/2)
-            if (weighted_norm(points%weight(:, p), section - motions(p)%state) > &
-                same_motion*weighted_norm(points%weight(:, p), section)) cycle
+            section = section_of(modal, series)
+            room = size(motions(p)%state)/2
+            ! The search knows nothing of the modes that the mesh does not feel.
+            known = merge(modal%weight, 0.0_wp, [felt, felt])
+            if (weighted_norm(known, section - narrow(motions(p)%state, modal%modes)) > &
+                same_motion*weighted_norm(known, section)) cycle
             measured = empty_response()
             call measure_harmonics(sampler, modal, equations(p), series, measured)
             if (measured%contact /= contact_kept) cycle
-            motions(p)%state = section
+            if (options%multipliers) call describe_orbit(orbits(p), options, motions(p))
+            motions(p)%state = widen(section, room)
             call describe_motion(motions(p), measured)
             answers(p) = measured
-            complete(p) = measured%error_estimate <= aim*tolerance
+            complete(p) = measured%error_estimate <= aim*options%tolerance
          end associate
       end do
    end subroutine measure_linear

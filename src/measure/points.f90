@@ -7,17 +7,17 @@
 module spurflex_measure_points
    use spurflex_base_attendant, only: attendant
    use spurflex_base_kinds, only: wp
-   use spurflex_integrate_lane_ensemble, only: widen, narrow
+   use spurflex_integrate_lane_ensemble, only: narrow
    use spurflex_integrate_options, only: solver_options, integrator_collocation, integrator_newmark
    use spurflex_integrate_steps, only: first_lane_steps, most_lane_steps, most_newmark_steps
    use spurflex_measure_effort, only: effort_type, stage_search, stage_measure, stage_alone
-   use spurflex_measure_lane_solver, only: lane_solver, forget_parts, find_part, measure_orbits, measure_windows
+   use spurflex_measure_lane_search, only: search_in_lanes
+   use spurflex_measure_lane_solver, only: lane_solver, measure_orbits, measure_windows
    use spurflex_measure_point, only: point_solver, new_point_solver, respond_alone
    use spurflex_measure_response, only: response, empty_response
    use spurflex_model_equations, only: equations_type
-   use spurflex_model_modal, only: to_modes, from_modes
+   use spurflex_model_modal, only: from_modes
    use spurflex_steady_outcome, only: steady_motion, status_diverged
-   use spurflex_steady_search, only: find_steady_motions
    use spurflex_steady_orbit, only: periodic_orbit
    implicit none
    private
@@ -98,11 +98,11 @@ contains
       start_positions = positions
       start_velocities = velocities
       if (solve_in_lanes(solver%lanes%options)) then
-         call forget_parts(solver%lanes)
+         call solver%lanes%parts%forget()
          do i = 1, size(equations)
-            call find_part(solver%lanes, equations(i), part(i))
+            call solver%lanes%parts%find(equations(i), part(i))
             steps(i) = huge(steps)
-            if (part(i) > 0) steps(i) = first_lane_steps(equations(i), solver%lanes%modal(part(i)), &
+            if (part(i) > 0) steps(i) = first_lane_steps(equations(i), solver%lanes%parts%modal(part(i)), &
                                                          solver%lanes%options%tolerance)
          end do
          do i = 1, size(equations)
@@ -119,7 +119,7 @@ contains
                                   solver%effort, motions, orbits, answers, done)
          end do
       end if
-      solver%effort%steps = solver%lanes%points%steps_done + solver%lanes%judge%steps_done
+      solver%effort%steps = solver%lanes%seekers%steps_done + solver%lanes%points%steps_done + solver%lanes%judge%steps_done
       do i = 1, size(equations)
          if (done(i)) then
             call solver%effort%count_point(answers(i), motions(i)%periods > 0, alone=.false.)
@@ -189,37 +189,32 @@ contains
       type(steady_motion) :: found(size(group))
       type(periodic_orbit) :: near(size(group))
       type(response) :: measured(size(group))
-      real(wp), allocatable :: starts(:, :), position(:), velocity(:)
+      real(wp), allocatable :: position(:), velocity(:)
       integer, allocatable :: own(:)
       logical :: complete(size(group))
-      integer :: i, k
+      integer :: few(size(group)), i, k
 
       call effort%begin()
       ! Steps that are given choose the motion too; free ones are chosen to measure it, and collocation finds it.
       solver%steps = steps
-      solver%points%by_newmark = solver%options%steps_per_period > 0
-      call solver%points%load(equations, solver%modal, part, &
-                              merge(solver%options%steps_per_period, steps, solver%points%by_newmark))
-      allocate (starts(solver%points%size, size(group)))
-      do i = 1, size(group)
-         starts(:, i) = widen(to_modes(solver%modal(part(i)), positions(:, group(i)), velocities(:, group(i))), &
-                              solver%points%size/2)
-      end do
-      call find_steady_motions(solver%points, starts, solver%options, visitor, found, near)
+      solver%seekers%by_newmark = solver%options%steps_per_period > 0
+      call search_in_lanes(solver%seekers, solver%parts, equations, part, &
+                           merge(solver%options%steps_per_period, steps, solver%seekers%by_newmark), solver%options, &
+                           positions(:, group), velocities(:, group), visitor, few, found, near)
       call effort%end(stage_search)
       complete = .false.
       measured = empty_response()
       if (solver%options%integrator == integrator_collocation .or. is_average(solver%options)) then
          call measure_windows(solver, equations, part, pack([(i, i=1, size(group))], found%status /= status_diverged &
                                                       .and. found%periods == 0), visitor, found, measured, complete)
-         call measure_orbits(solver, equations, part, pack([(i, i=1, size(group))], found%periods > 0), visitor, found, near, &
+         call measure_orbits(solver, equations, part, few, pack([(i, i=1, size(group))], found%periods > 0), visitor, found, near, &
                              measured, complete)
       end if
       call effort%end(stage_measure)
       do i = 1, size(group)
          ! What diverges in lanes may have had too few steps.
          if (found(i)%status == status_diverged) cycle
-         associate (modal => solver%modal(part(i)))
+         associate (modal => solver%parts%modal(part(i)))
             call from_modes(modal, narrow(found(i)%state, modal%modes), position, velocity)
          end associate
          positions(:, group(i)) = position
@@ -228,8 +223,8 @@ contains
          done(group(i)) = complete(i)
          if (complete(i)) answers(group(i)) = measured(i)
          if (complete(i) .or. found(i)%periods == 0) cycle
-         own = [(k, k=1, solver%modal(part(i))%modes)]
-         own = [own, solver%points%size/2 + own]
+         own = [(k, k=1, solver%parts%modal(part(i))%modes)]
+         own = [own, size(found(i)%state)/2 + own]
          orbits(group(i))%monodromy = near(i)%monodromy(own, own)
       end do
    end subroutine respond_in_lanes

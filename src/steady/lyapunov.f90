@@ -9,7 +9,7 @@ module spurflex_steady_lyapunov
    implicit none
    private
 
-   public :: lyapunov_sum, unknown
+   public :: lyapunov_sum, unknown, smooth_weight
 
    !> Error of an exponent that is not known; far above any exponent.
    real(wp), parameter :: unknown = 1.0e30_wp
@@ -107,10 +107,20 @@ contains
 
       real(wp) :: here
 
-      here = max(place*(1.0_wp - place), 0.0_wp)**4
+      here = smooth_weight(place)
       weight = weight + here
       weighted = weighted + here*logarithm
    end subroutine weigh
+
+   !> A weight that vanishes smoothly at both ends of what is averaged.
+   elemental function smooth_weight(place) result(weight)
+      !> Place in it, from 0 to 1.
+      real(wp), intent(in) :: place
+      !> The weight; zero outside.
+      real(wp) :: weight
+
+      weight = max(place*(1.0_wp - place), 0.0_wp)**4
+   end function smooth_weight
 
    !> Exponent as a weighted mean, and half of what those of the two halves differ by; unknown before all that
    !> was planned is seen. What comes after does not count.

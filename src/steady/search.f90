@@ -11,13 +11,13 @@ module spurflex_steady_search
    use spurflex_integrate_options, only: solver_options
    use spurflex_integrate_period_map, only: period_map
    use spurflex_steady_candidate, only: candidate_type
-   use spurflex_steady_lyapunov, only: unknown
+   use spurflex_steady_irregular, only: classify, may_decide
    use spurflex_steady_outcome, only: steady_motion, status_missing, status_settled, status_not_settled, status_diverged, &
-      reason_non_finite, reason_max_periods, motion_unresolved, motion_quasi_periodic, motion_chaotic, motion_of_periods
+      reason_non_finite, reason_max_periods, motion_unresolved, motion_of_periods
    use spurflex_steady_sections, only: weighted_norm
    use spurflex_steady_orbit, only: periodic_orbit, move_orbit, contact_is_kept
    use spurflex_steady_stability, only: find_stable_orbits, largest_multiplier
-   use spurflex_steady_transient, only: transient_type, begin_transient, watch_from_now, advance_transients, drift
+   use spurflex_steady_transient, only: transient_type, begin_transient, watch_from_now, advance_transients
    implicit none
    private
 
@@ -40,29 +40,6 @@ module spurflex_steady_search
 
    !> Share of the clearance of a motion that the rest of a transient may take and surely never part the teeth.
    real(wp), parameter :: safe_share = 0.5_wp
-
-   !> Standard errors by which an exponent must differ from zero.
-   real(wp), parameter :: significance = 4.0_wp
-
-   !> Growth of a tangent, in units of its logarithm, that says nothing however long it is summed: on a torus it wanders by a
-   !> few units. Over T periods an exponent below this over T is therefore called zero.
-   real(wp), parameter :: neutral_growth = 10.0_wp
-
-   !> Share of the last watch that counts as all of it: blocks of growth that are not full are left out.
-   real(wp), parameter :: whole_watch = 0.9_wp
-
-   !> Mesh periods over which a motion that is called quasi-periodic or chaotic must have been watched; fewer if it is plainly
-   !> quasi-periodic.
-   integer, parameter :: fewest_periods = 512, fewest_if_plain = 384
-
-   !> Weighted mean of the growth that is none, whatever the periods: on the tori of the paper's gears it is some 1e-4 after 768.
-   real(wp), parameter :: no_growth = 2.0e-3_wp
-
-   !> Drift of a motion that has arrived; of one that cannot be watched any longer; of one that has been watched over fewer periods.
-   real(wp), parameter :: arrived_drift = 0.025_wp, last_drift = 0.05_wp, plain_drift = 0.002_wp
-
-   !> Drift from which a motion hardly arrives within the next few hundred periods.
-   real(wp), parameter :: far_drift = 0.1_wp
 
 contains
 
@@ -117,7 +94,7 @@ contains
          call look_for_orbits(points, left, options, visitor, transients, candidates, motions, orbits)
          do i = 1, size(left)
             if (motions(left(i))%status /= status_missing .or. .not. transients(left(i))%sound) cycle
-            call classify(transients(left(i)), options%max_periods, motions(left(i)))
+            call classify(transients(left(i)), options%max_periods, last_watch(options%max_periods), motions(left(i)))
          end do
          left = pack(left, motions(left)%status == status_missing .and. transients(left)%sound &
                      .and. transients(left)%periods < options%max_periods)
@@ -126,8 +103,7 @@ contains
             until = merge(options%max_periods, next_look, 2*next_look > options%max_periods)
             do i = 1, size(left)
                ! A tangent is worth while in a watch that can decide on the class.
-               call watch_from_now(transients(left(i)), until, grows=until - next_look/2 >= &
-                                   merge(fewest_periods, fewest_if_plain, drift(transients(left(i))) > far_drift))
+               call watch_from_now(transients(left(i)), until, grows=may_decide(transients(left(i)), until - next_look/2))
             end do
             ! Those with tangents first: lanes without need not wait for lanes with.
             left = [pack(left, transients(left)%grows), pack(left, .not. transients(left)%grows)]
@@ -361,45 +337,5 @@ contains
       end do
       periods = most_periods - look/2
    end function last_watch
-
-   !> The class of a motion in which nothing periodic was found; its status remains `status_missing` where it cannot be told.
-   !>
-   !> Whatever the periods watched, an exponent is called zero to the same resolution, that of the last watch: a tangent whose
-   !> growth wanders less than that in a shorter watch need not be watched longer. Nor need one whose weighted growth vanishes.
-   pure subroutine classify(transient, most_periods, motion)
-      !> The transient.
-      type(transient_type), intent(in) :: transient
-      !> Most periods; chaos is watched as long, for the sake of its exponent.
-      integer, intent(in) :: most_periods
-      !> The motion.
-      type(steady_motion), intent(inout) :: motion
-
-      real(wp) :: neutral, wander, smooth, smooth_error, still
-      integer :: periods
-      logical :: at_last, vanishes
-
-      call transient%growth%exponent(motion%lyapunov_exponent, motion%lyapunov_error, periods, wander)
-      if (periods < fewest_if_plain) return
-      call transient%growth%smooth_exponent(smooth, smooth_error)
-      vanishes = smooth_error < unknown .and. abs(smooth) <= no_growth
-      at_last = transient%periods >= most_periods
-      still = merge(last_drift, merge(arrived_drift, plain_drift, periods >= fewest_periods), at_last)
-      neutral = neutral_growth/real(max(periods, 1), wp)
-      if (periods >= fewest_periods) then
-         if (motion%lyapunov_exponent > neutral + significance*motion%lyapunov_error) then
-            motion%motion = motion_chaotic
-            if (at_last) motion%status = status_settled
-            return
-         end if
-         vanishes = vanishes .or. &
-                    wander <= neutral_growth*min(real(periods, wp)/(whole_watch*real(last_watch(most_periods), wp)), 1.0_wp)
-      end if
-      if (.not. vanishes .or. drift(transient) > still) return
-      motion%motion = motion_quasi_periodic
-      motion%status = status_settled
-      if (smooth_error >= unknown) return
-      motion%lyapunov_exponent = smooth
-      motion%lyapunov_error = smooth_error
-   end subroutine classify
 
 end module spurflex_steady_search
