@@ -19,6 +19,7 @@ program unit_tests
    use test_results, only: collect_results
    use test_steady, only: collect_steady
    use test_modal, only: collect_modal
+   use test_truncation, only: collect_truncation
    use test_exponential, only: collect_exponential
    use test_crossings, only: collect_crossings
    use test_shooting, only: collect_shooting
@@ -55,6 +56,7 @@ program unit_tests
             new_testsuite('forecast', collect_forecast), &
             new_testsuite('steady', collect_steady), &
             new_testsuite('modal', collect_modal), &
+            new_testsuite('truncation', collect_truncation), &
             new_testsuite('exponential', collect_exponential), &
             new_testsuite('crossings', collect_crossings), &
             new_testsuite('harmonic', collect_harmonic), &
