@@ -80,7 +80,7 @@ contains
          associate (felt => parts%truncation(few(i))%felt)
             motions(i)%state = complete_state(motions(i)%state, few_room, felt, parts%modal(part(i)), forces(i), room)
             if (motions(i)%periods == 0) cycle
-            orbits(i)%state = complete_state(orbits(i)%state, few_room, felt, parts%modal(part(i)), forces(i), room)
+            orbits(i)%state = motions(i)%state
             orbits(i)%monodromy = complete_monodromy(orbits(i)%monodromy, few_room, felt, parts%modal(part(i)), &
                                                      real(orbits(i)%periods, wp)*2.0_wp*pi/equations(i)%frequency, room)
          end associate

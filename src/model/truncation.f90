@@ -131,17 +131,22 @@ contains
       !> The state, shape (2 room).
       real(wp) :: state(2*room)
 
-      complex(wp) :: steady(modal%modes)
-      integer, allocatable :: place(:)
-      integer :: k
+      complex(wp) :: steady
+      integer :: place, k
 
-      place = pack([(k, k=1, size(felt))], felt)
-      steady = modal%influence/modal%rate*force
       state = 0.0_wp
-      state(:modal%modes) = real(steady, wp)
-      state(room + 1:room + modal%modes) = aimag(steady)
-      state(place) = few(:size(place))
-      state(room + place) = few(few_room + 1:few_room + size(place))
+      place = 0
+      do k = 1, modal%modes
+         if (felt(k)) then
+            place = place + 1
+            state(k) = few(place)
+            state(room + k) = few(few_room + place)
+         else
+            steady = modal%influence(k)/modal%rate(k)*force
+            state(k) = real(steady, wp)
+            state(room + k) = aimag(steady)
+         end if
+      end do
    end function complete_state
 
    !> A monodromy in all modes, nearly: the mesh does not feel the others, which decay on their own, but it moves with them.
@@ -161,14 +166,24 @@ contains
       real(wp) :: monodromy(2*room, 2*room)
 
       complex(wp) :: decay
-      integer, allocatable :: place(:), from(:)
-      integer :: k
+      integer :: row, column, i, j, k
 
-      place = pack([(k, k=1, size(felt))], felt)
-      from = [(k, k=1, size(place))]
       monodromy = 0.0_wp
-      monodromy([place, room + place], [place, room + place]) = few([from, few_room + from], [from, few_room + from])
-      do k = 1, size(felt)
+      column = 0
+      do j = 1, modal%modes
+         if (.not. felt(j)) cycle
+         column = column + 1
+         row = 0
+         do i = 1, modal%modes
+            if (.not. felt(i)) cycle
+            row = row + 1
+            monodromy(i, j) = few(row, column)
+            monodromy(room + i, j) = few(few_room + row, column)
+            monodromy(i, room + j) = few(row, few_room + column)
+            monodromy(room + i, room + j) = few(few_room + row, few_room + column)
+         end do
+      end do
+      do k = 1, modal%modes
          if (felt(k)) cycle
          decay = exp(modal%rate(k)*time)
          monodromy(k, k) = real(decay, wp)

@@ -20,6 +20,8 @@ module spurflex_steady_sections
       !> Sections, the k-th that was taken in column mod(k - 1, room), shape (size, 0:room - 1). Those that are asked for were taken
       !> one mesh period after the other.
       real(wp), allocatable :: sections(:, :)
+      !> Norm of each of them [m].
+      real(wp) :: norms(0:longest_period) = 0.0_wp
       !> Sections taken.
       integer :: seen = 0
    contains
@@ -51,14 +53,24 @@ contains
    end subroutine reset
 
    !> Take a section.
-   pure subroutine add(self, state)
+   pure subroutine add(self, state, norm)
       !> Ring.
       class(section_ring), intent(inout) :: self
       !> State at the section, shape (size).
       real(wp), intent(in) :: state(:)
+      !> Its norm, if it is known [m].
+      real(wp), intent(in), optional :: norm
+
+      integer :: place
 
       if (self%seen == size(self%sections, 2) .and. self%seen <= longest_period) call make_room(self)
-      self%sections(:, mod(self%seen, size(self%sections, 2))) = state
+      place = mod(self%seen, size(self%sections, 2))
+      self%sections(:, place) = state
+      if (present(norm)) then
+         self%norms(place) = norm
+      else
+         self%norms(place) = weighted_norm(self%weight, state)
+      end if
       self%seen = self%seen + 1
    end subroutine add
 
@@ -112,15 +124,11 @@ contains
    pure function largest_norm(self) result(norm)
       !> Ring.
       class(section_ring), intent(in) :: self
-      !> The norm; not a number where a state is not.
+      !> The norm.
       real(wp) :: norm
 
-      integer :: k
-
       norm = 0.0_wp
-      do k = 0, min(longest_period, self%seen - 1)
-         norm = max(norm, weighted_norm(self%weight, self%sections(:, k)))
-      end do
+      if (self%seen > 0) norm = maxval(self%norms(:min(longest_period, self%seen - 1)))
    end function largest_norm
 
    !> Column of the section some periods ago.

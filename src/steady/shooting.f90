@@ -155,7 +155,7 @@ contains
 
       real(wp) :: states(points%seats, points%size)
       real(wp), allocatable :: tangents(:, :, :)
-      integer :: seated(points%seats), next, k
+      integer :: seated(points%seats), next, k, i
       logical :: ends(points%seats)
 
       if (.not. any(runs(newton%items, with_tangents))) return
@@ -189,7 +189,10 @@ contains
                item%done = item%done + 1
                ends(k) = item%done >= orbits(seated(k))%periods
                if (.not. (ends(k) .and. with_tangents)) cycle
-               orbits(seated(k))%monodromy = transpose(tangents(k, :, :))
+               if (.not. allocated(orbits(seated(k))%monodromy)) allocate (orbits(seated(k))%monodromy(points%size, points%size))
+               do i = 1, points%size
+                  orbits(seated(k))%monodromy(:, i) = tangents(k, i, :)
+               end do
                orbits(seated(k))%given = .false.
             end associate
          end do
@@ -231,7 +234,7 @@ contains
          !> Which of the motions.
          integer, intent(in) :: p
 
-         integer :: i
+         integer :: c
 
          newton%items(p)%done = 0
          newton%items(p)%low = huge(1.0_wp)
@@ -239,8 +242,8 @@ contains
          states(k, :) = orbits(p)%state
          if (.not. with_tangents) return
          tangents(k, :, :) = 0.0_wp
-         do i = 1, points%size
-            if (points%in_use(i, members(p))) tangents(k, i, i) = 1.0_wp
+         do c = 1, points%size
+            if (points%in_use(c, members(p))) tangents(k, c, c) = 1.0_wp
          end do
       end subroutine begin_pass
 

@@ -165,7 +165,7 @@ contains
       if (transient%grows) call transient%growth%add(growth)
       transient%periods = transient%periods + 1
       ! Earlier ones will not be asked for.
-      if (until - transient%periods <= longest_period) call transient%ring%add(state)
+      if (until - transient%periods <= longest_period) call transient%ring%add(state, norm)
       transient%sound = norm < diverged_norm
       which = merge(1, 2, transient%periods <= transient%half)
       transient%low(which) = min(transient%low(which), norm)
