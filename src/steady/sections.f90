@@ -4,7 +4,7 @@ module spurflex_steady_sections
    implicit none
    private
 
-   public :: section_ring, longest_period, weighted_norm, weighted_norms
+   public :: section_ring, longest_period, weighted_norm, find_norms
 
    !> Longest motion looked for, in mesh periods.
    integer, parameter :: longest_period = 64
@@ -156,22 +156,24 @@ contains
       norm = sqrt(sum((weight*state)**2))
    end function weighted_norm
 
-   !> The same of a state in each seat.
-   pure function weighted_norms(weights, states) result(norms)
-      !> Weight of each component, and states, shape (seats, size).
-      real(wp), intent(in), contiguous :: weights(:, :), states(:, :)
-      !> Norm of each state, shape (seats).
-      real(wp) :: norms(size(states, 1))
+   !> The same of a state in each seat, or of the only tangent in each.
+   pure subroutine find_norms(seats, length, weights, states, norms)
+      !> Seats, and length of a state.
+      integer, intent(in) :: seats, length
+      !> Weight of each component, and states.
+      real(wp), intent(in) :: weights(seats, length), states(seats, length)
+      !> Norm of each state.
+      real(wp), intent(out) :: norms(seats)
 
       integer :: i, k
 
       norms = 0.0_wp
-      do i = 1, size(states, 2)
-         do k = 1, size(states, 1)
+      do i = 1, length
+         do k = 1, seats
             norms(k) = norms(k) + (weights(k, i)*states(k, i))**2
          end do
       end do
       norms = sqrt(norms)
-   end function weighted_norms
+   end subroutine find_norms
 
 end module spurflex_steady_sections

@@ -4,7 +4,7 @@ module spurflex_steady_transient
    use spurflex_base_kinds, only: wp
    use spurflex_integrate_ensemble, only: ensemble
    use spurflex_steady_lyapunov, only: lyapunov_sum
-   use spurflex_steady_sections, only: section_ring, longest_period, weighted_norm, weighted_norms
+   use spurflex_steady_sections, only: section_ring, longest_period, weighted_norm, find_norms
    implicit none
    private
 
@@ -62,16 +62,15 @@ contains
       !> The growth of a tangent is wanted.
       logical, intent(in) :: grows
 
-      real(wp) :: direction(size(transient%state))
-
       call transient%growth%reset(until - transient%periods)
       transient%low = huge(1.0_wp)
       transient%high = -huge(1.0_wp)
       transient%half = (transient%periods + until)/2
       if (grows .and. .not. transient%grows) then
          ! Any tangent turns into the direction that grows most, or decays least, but on a torus only slowly.
-         direction = transient%ring%return_direction()
-         if (any(abs(direction) > 0.0_wp)) transient%tangent = direction
+         associate (direction => transient%ring%return_direction())
+            if (any(abs(direction) > 0.0_wp)) transient%tangent = direction
+         end associate
       end if
       transient%grows = grows
    end subroutine watch_from_now
@@ -120,14 +119,15 @@ contains
          end do
          if (grows) then
             call points%advance(states, tangents)
-            growth = max(weighted_norms(weights, tangents(:, 1, :)), tiny(1.0_wp))
+            call find_norms(points%seats, points%size, weights, tangents, growth)
+            growth = max(growth, tiny(1.0_wp))
             do i = 1, points%size
                tangents(:, 1, i) = tangents(:, 1, i)/growth
             end do
          else
             call points%advance(states)
          end if
-         sizes = weighted_norms(weights, states)
+         call find_norms(points%seats, points%size, weights, states, sizes)
          do k = 1, points%seats
             if (seated(k) == 0) then
                ! An empty seat is integrated with the others, always from zero, so that nothing can overflow.
