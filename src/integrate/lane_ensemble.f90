@@ -21,8 +21,8 @@ module spurflex_integrate_lane_ensemble
    !> Points in lanes. A state holds the real parts of the modes, then the imaginary parts; a point with fewer modes than the
    !> others has zeros behind its own.
    type, extends(ensemble) :: lane_ensemble
-      !> Steps done so far, in all lanes at once, by kind.
-      integer(i8) :: steps_done(kinds_of_steps) = 0
+      !> Steps done so far, in all lanes at once, by kind, and the modes of all of them together.
+      integer(i8), dimension(kinds_of_steps) :: steps_done = 0, modes_done = 0
       !> By Newmark's method of average acceleration, not by collocation.
       logical :: by_newmark = .false.
       !> Steps per mesh period.
@@ -134,7 +134,7 @@ contains
 
       integer :: rounds
 
-      self%steps_done(steps_of_motions) = self%steps_done(steps_of_motions) + self%steps
+      call count_steps(self, steps_of_motions, 1)
       if (self%by_newmark .and. present(tangents)) then
          call advance_newmark(self%rule, self%pitch, states, self%smallest, self%largest, self%gain)
          call carry_newmark(self%rule, self%steps, self%gain, size(tangents, 2), tangents)
@@ -147,8 +147,22 @@ contains
          call advance_lanes(self%rule, self%pitch, states, self%smallest, self%largest, self%gain)
          call carry_lane_tangents(self%rule, self%steps, self%gain, size(tangents, 2), tangents, rounds)
       end if
-      if (present(tangents)) self%steps_done(steps_of_tangents) = self%steps_done(steps_of_tangents) + int(self%steps, i8)*rounds
+      if (present(tangents)) call count_steps(self, steps_of_tangents, rounds)
    end subroutine advance_seats
+
+   !> Count the steps of a mesh period.
+   pure subroutine count_steps(self, kind, rounds)
+      !> Ensemble.
+      class(lane_ensemble), intent(inout) :: self
+      !> `steps_...`, and how often the lanes took them.
+      integer, intent(in) :: kind, rounds
+
+      integer(i8) :: steps
+
+      steps = int(self%steps, i8)*rounds
+      self%steps_done(kind) = self%steps_done(kind) + steps
+      self%modes_done(kind) = self%modes_done(kind) + steps*(self%size/2)
+   end subroutine count_steps
 
    !> Advance all lanes by one mesh period and record it.
    subroutine advance_recorded(self, states)
@@ -157,7 +171,7 @@ contains
       !> States at the section, shape (seats, size).
       real(wp), intent(inout), contiguous :: states(:, :)
 
-      self%steps_done(steps_recorded) = self%steps_done(steps_recorded) + self%steps
+      call count_steps(self, steps_recorded, 1)
       if (self%by_newmark) then
          call advance_newmark(self%rule, self%pitch, states, self%smallest, self%largest, record=self%record)
       else

@@ -24,8 +24,8 @@ module spurflex_measure_effort
       !> Points by way, seconds by stage.
       integer(i8) :: points(ways) = 0
       real(wp) :: seconds(stages) = 0.0_wp
-      !> Steps by kind, in all lanes at once.
-      integer(i8) :: steps(kinds_of_steps) = 0
+      !> Steps by kind, in all lanes at once, and the modes of all of them together.
+      integer(i8), dimension(kinds_of_steps) :: steps = 0, modes = 0
       integer(i8), private :: since = 0
    contains
       !> Begin a stage.
@@ -92,9 +92,23 @@ contains
              //to_text(self%points(way_alone))//' alone' &
              //new_line('a')//'time by path, all ranks: search '//fixed_text(self%seconds(stage_search), 2)//' s, measurement ' &
              //fixed_text(self%seconds(stage_measure), 2)//' s, alone '//fixed_text(self%seconds(stage_alone), 2)//' s' &
-             //new_line('a')//'steps in '//to_text(lanes)//' lanes at once: '//to_text(self%steps(steps_of_motions)) &
-             //' of motions, '//to_text(self%steps(steps_of_tangents))//' of tangents, ' &
-             //to_text(self%steps(steps_recorded))//' recorded'
+             //new_line('a')//'steps in '//to_text(lanes)//' lanes at once: '//steps_of(steps_of_motions, 'of motions')//', ' &
+             //steps_of(steps_of_tangents, 'of tangents')//', '//steps_of(steps_recorded, 'recorded')
+
+   contains
+
+      !> Steps of a kind, and the modes that they have on average.
+      pure function steps_of(kind, name) result(words)
+         !> `steps_...`, and what it is called.
+         integer, intent(in) :: kind
+         character(len=*), intent(in) :: name
+         !> The words.
+         character(len=:), allocatable :: words
+
+         words = to_text(self%steps(kind))//' '//name//' with ' &
+                 //fixed_text(real(self%modes(kind), wp)/real(max(self%steps(kind), 1_i8), wp), 1)//' modes'
+      end function steps_of
+
    end function describe
 
 end module spurflex_measure_effort

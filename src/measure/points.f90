@@ -119,7 +119,10 @@ contains
                                   solver%effort, motions, orbits, answers, done)
          end do
       end if
-      solver%effort%steps = solver%lanes%seekers%steps_done + solver%lanes%points%steps_done + solver%lanes%judge%steps_done
+      associate (lanes => solver%lanes)
+         solver%effort%steps = lanes%seekers%steps_done + lanes%points%steps_done + lanes%judge%steps_done
+         solver%effort%modes = lanes%seekers%modes_done + lanes%points%modes_done + lanes%judge%modes_done
+      end associate
       do i = 1, size(equations)
          if (done(i)) then
             call solver%effort%count_point(answers(i), motions(i)%periods > 0, alone=.false.)

@@ -99,6 +99,7 @@ contains
       effort = effort_type()
       call mpi_reduce(solver%effort%points, effort%points, ways, MPI_INTEGER8, MPI_SUM, 0, comm)
       call mpi_reduce(solver%effort%steps, effort%steps, kinds_of_steps, MPI_INTEGER8, MPI_SUM, 0, comm)
+      call mpi_reduce(solver%effort%modes, effort%modes, kinds_of_steps, MPI_INTEGER8, MPI_SUM, 0, comm)
       call mpi_reduce(solver%effort%seconds, effort%seconds, stages, MPI_DOUBLE_PRECISION, MPI_SUM, 0, comm)
    end subroutine work_on_chunks
 

@@ -195,12 +195,16 @@ def paths_in(log):
 
 
 def steps_in(log):
-    """Steps of points in all lanes by kind, of all lines `steps in N lanes ...` of the log together."""
-    steps = {}
+    """Steps of points in all lanes, and their modes on average, by kind.
+
+    Of all lines `steps in N lanes ...` of the log together.
+    """
+    steps, modes = {}, {}
     for lanes, kinds in re.findall(r"^steps in (\d+) lanes at once: (.*)$", log, flags=re.M):
-        for count, name in re.findall(r"(\d+) (?:of )?(\w+)", kinds):
+        for count, name, mean in re.findall(r"(\d+) (?:of )?(\w+) with ([\d.]+) modes", kinds):
             steps[name] = steps.get(name, 0) + int(lanes) * int(count)
-    return steps
+            modes[name] = modes.get(name, 0.0) + int(lanes) * int(count) * float(mean)
+    return steps, {name: modes[name] / max(count, 1) for name, count in steps.items()}
 
 
 # Result files ------------------------------------------------------------------------------------

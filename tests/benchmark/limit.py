@@ -16,12 +16,20 @@ TOLERANCES = (1e-3, 1e-6)
 QUICK_GRID = {"speed_count": 58, "stiffness_count": 10}
 SHORTEST = 16  # steps a mesh period at least
 RANKS = 2
-# Loops that the kinds of steps run in; a recorded step is at least a step.
+# Loops that the kinds of steps run in, with few modes and with all; a recorded step is at least a step.
 LOOPS = {
-    "motions": "collocation, flexible",
-    "tangents": "collocation, tangents",
-    "recorded": "collocation, flexible",
+    "motions": ("collocation, rigid", "collocation, flexible"),
+    "tangents": ("collocation, tangents, rigid", "collocation, tangents"),
+    "recorded": ("collocation, rigid", "collocation, flexible"),
 }
+
+
+def at_best(loops, kind, modes):
+    """Seconds and operations of a step at the best rate of its loop: linear in the modes."""
+    few, all_modes = (loops[name] for name in LOOPS[kind])
+    share = (modes - few["modes"]) / (all_modes["modes"] - few["modes"])
+    both = [(1.0 / loop["best_per_second"], loop["operations"]) for loop in (few, all_modes)]
+    return tuple(low + share * (high - low) for low, high in zip(*both, strict=True))
 
 
 def limits_of(program, options, tolerance, loops, launch):
@@ -33,16 +41,18 @@ def limits_of(program, options, tolerance, loops, launch):
         run = program.run(deck, 1)
         if best is None or run.program_seconds < best.program_seconds:
             best = run
-    steps = harness.steps_in(best.log)
+    steps, modes = harness.steps_in(best.log)
     with h5py.File(result, locking=False) as file:
         periods = sum(int(file[name][:].sum()) for name in file if name.endswith("periods_integrated"))
         points = sum(file[name].size for name in file if name.endswith("periods_integrated"))
-    seconds = {kind: count / loops[LOOPS[kind]]["best_per_second"] for kind, count in steps.items()}
-    operations = sum(count * loops[LOOPS[kind]]["operations"] for kind, count in steps.items())
+    cost = {kind: at_best(loops, kind, modes[kind]) for kind in steps}
+    seconds = {kind: count * cost[kind][0] for kind, count in steps.items()}
+    operations = sum(count * cost[kind][1] for kind, count in steps.items())
     return {
         "tolerance": tolerance,
         "points": points,
         "steps": steps,
+        "modes": modes,
         "seconds_at_best_rate": seconds,
         "operations": operations,
         "program_seconds": best.program_seconds,
@@ -58,8 +68,9 @@ def demands_of(options, loops):
     if not path.is_file():
         return []
     demands = []
-    period = SHORTEST / loops[LOOPS["motions"]]["best_per_second"]
-    monodromy = SHORTEST**2 / loops[LOOPS["tangents"]]["best_per_second"]
+    modes = loops[LOOPS["tangents"][1]]["modes"]
+    period = SHORTEST * at_best(loops, "motions", modes)[0]
+    monodromy = SHORTEST * 2 * modes * at_best(loops, "tangents", modes)[0]
     for title, verdict in json.loads(path.read_text())["targets"].items():
         if not title.endswith("total") or verdict["value"] is None:
             continue
@@ -77,13 +88,13 @@ def describe(limits, demands, peak, launch):
         f"Peak {peak / 1e9:.1f}e9 operations/s and core; starting MPI on {RANKS} ranks takes {launch:.2f} s.",
         "Least: the counted steps at the best rate of their loops, everything else for nothing.",
         "",
-        "| tolerance | points | kind | steps | least seconds of one core |",
-        "|---|---|---|---|---|",
+        "| tolerance | points | kind | steps | modes | least seconds of one core |",
+        "|---|---|---|---|---|---|",
     ]
     for limit in limits:
         lines += [
             f"| {limit['tolerance']:g} | {limit['points']} | {kind} | {count:.3g} "
-            f"| {limit['seconds_at_best_rate'][kind]:.2f} |"
+            f"| {limit['modes'][kind]:.1f} | {limit['seconds_at_best_rate'][kind]:.2f} |"
             for kind, count in limit["steps"].items()
         ]
     lines += [
