@@ -117,7 +117,7 @@ contains
          call reach(borders(border), pitch%half_backlash, gap, smallest, largest)
          if (.not. with_slope) cycle
          call set_part(gap, borders(border)%beyond, from, length)
-         call add_slope(pitch, place, borders(border)%begins, gap, from, length, border == 1, added_slope)
+         call add_slope(pitch, place, borders(border)%begins, from, length, border == 1, added_slope)
       end do
    end subroutine correct
 
@@ -198,7 +198,7 @@ contains
       type(parabola_type), intent(in) :: gap
       !> Negative in the lanes that are beyond the border at all.
       real(wp), intent(in) :: beyond(lanes)
-      !> Where the part begins, and how long it is, as shares of the step; 1 and 0 where there is none.
+      !> Where the part begins, and how long it is, as shares of the step; its length is 0 where there is none.
       real(wp), intent(out) :: from(lanes), length(lanes)
 
       real(wp) :: s, p, q, w, turn, end, first, outside
@@ -267,7 +267,7 @@ contains
       !> What there is of N without [N].
       real(wp), intent(in) :: rest(lanes, points)
       !> The same with what is added [N].
-      real(wp), intent(inout) :: added(lanes, points)
+      real(wp), intent(out) :: added(lanes, points)
 
       real(wp) :: k, kp, kq, u, value, first, second, third, mean, tilt, bend
       integer :: l, g
@@ -295,15 +295,13 @@ contains
    end subroutine add_force
 
    !> Derivative of what `add_force` adds by x at each point.
-   pure subroutine add_slope(pitch, place, begins, gap, from, length, anew, slope)
+   pure subroutine add_slope(pitch, place, begins, from, length, anew, slope)
       !> The mesh.
       type(mesh_cycle), intent(in) :: pitch
       !> Index of the start of the step in the cycle.
       integer, intent(in) :: place
       !> 1 where the step begins in contact at the border, -1 where not.
       real(wp), intent(in) :: begins(lanes)
-      !> Clearance.
-      type(parabola_type), intent(in) :: gap
       !> Part of the step.
       real(wp), intent(in) :: from(lanes), length(lanes)
       !> Nothing was added before.

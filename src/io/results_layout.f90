@@ -117,7 +117,7 @@ module spurflex_io_results_layout
       quantity_type('lyapunov_exponent', '1', real_value, .false., 'lyapunov', &
                     'largest Lyapunov exponent per mesh period'), &
       quantity_type('lyapunov_error', '1', real_value, .false., 'lyapunov', &
-                    'standard error of lyapunov_exponent per mesh period'), &
+                    'estimated error of lyapunov_exponent per mesh period'), &
       quantity_type('motion', '1', motion_flag, .false., '', 'class of the steady motion'), &
       quantity_type('periods_integrated', '1', plain_integer, .false., '', 'mesh periods integrated'), &
       quantity_type('contact', '1', contact_flag, .false., '', 'contact of the teeth'), &

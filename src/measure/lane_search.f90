@@ -7,7 +7,7 @@ module spurflex_measure_lane_search
    use spurflex_integrate_options, only: solver_options
    use spurflex_measure_linear_parts, only: linear_parts
    use spurflex_model_equations, only: equations_type
-   use spurflex_model_modal, only: to_modes
+   use spurflex_model_modal, only: modal_system, to_modes
    use spurflex_model_truncation, only: complete_state, complete_monodromy
    use spurflex_steady_lyapunov, only: smooth_weight
    use spurflex_steady_orbit, only: periodic_orbit
@@ -55,15 +55,16 @@ contains
 
       type(solver_options) :: seek
       real(wp), allocatable :: starts(:, :)
-      real(wp) :: forces(size(part))
+      real(wp) :: forces(size(part)), least_share
       integer :: few_room, room, i
 
       ! Newmark's method with given steps answers with all of its modes and multipliers.
       seek = options
       seek%multipliers = options%multipliers .and. seekers%by_newmark
       do i = 1, size(part)
-         call parts%find_felt(part(i), equations(i)%frequency, merge(-1.0_wp, felt_share*options%tolerance, seekers%by_newmark), &
-                              few(i))
+         least_share = merge(-1.0_wp, felt_share*options%tolerance, seekers%by_newmark)
+         call parts%find_felt(part(i), equations(i)%frequency, least_share, moving_modes(parts%modal(part(i)), positions(:, i), &
+                              velocities(:, i), least_share*equations(i)%mesh%half_backlash), few(i))
       end do
       call seekers%load(equations, parts%few, few, steps)
       few_room = seekers%size/2
@@ -86,6 +87,26 @@ contains
          end associate
       end do
    end subroutine search_in_lanes
+
+   !> Modes that a start moves: the sway of a support, from rest, which the mesh force would hardly excite.
+   pure function moving_modes(modal, position, velocity, least) result(moves)
+      !> The linear part.
+      type(modal_system), intent(in) :: modal
+      !> Deviation from the static equilibrium and its rate at the start, shape (coordinates).
+      real(wp), intent(in) :: position(:), velocity(:)
+      !> Mesh deflection that counts [m].
+      real(wp), intent(in) :: least
+      !> They do, shape (modes).
+      logical :: moves(modal%modes)
+
+      real(wp) :: state(2*modal%modes), modulus(modal%modes)
+
+      moves = .false.
+      if (.not. (any(abs(position) > 0.0_wp) .or. any(abs(velocity) > 0.0_wp))) return
+      state = to_modes(modal, position, velocity)
+      modulus = sqrt(state(:modal%modes)**2 + state(modal%modes + 1:)**2)
+      moves = modulus > least
+   end function moving_modes
 
    !> Mean of what drives the modes, N, over some mesh periods of motions that are not periodic; weighted as that of the growth of a
    !> tangent is, for the same reason.

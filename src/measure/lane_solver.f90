@@ -47,7 +47,7 @@ contains
 
    !> Measure periodic motions, with more and more steps where the tolerance asks for them.
    subroutine measure_orbits(solver, equations, part, few, members, visitor, motions, orbits, answers, complete)
-      !> Solver, its points loaded.
+      !> Solver; it loads the points.
       type(lane_solver), intent(inout) :: solver
       !> Equations of motion of each point, shape (n).
       type(equations_type), intent(in) :: equations(:)
@@ -155,7 +155,10 @@ contains
       logical, intent(in) :: only_follow
 
       type(periodic_orbit) :: again(size(members))
+      type(periodic_orbit), allocatable :: astray(:)
+      integer, allocatable :: which(:)
       logical :: is_found(size(members))
+      logical, allocatable :: is_there(:)
       integer :: i
 
       if (size(members) == 0) return
@@ -163,6 +166,16 @@ contains
       if (only_follow) then
          call find_orbits(solver%points, members, sizes(solver%points, members, again), visitor, again, is_found, &
                           monodromy_is_near=.true., roughly=.true., near_enough=judge_share*solver%options%tolerance)
+         ! Where a new monodromy was needed the steps may have led to another motion.
+         which = pack([(i, i=1, size(members))], .not. (is_found .and. again%given))
+         if (size(which) > 0) then
+            astray = orbits(members(which))
+            allocate (is_there(size(which)))
+            call follow_orbits(solver%points, members(which), sizes(solver%points, members(which), astray), visitor, astray, &
+                               is_there)
+            again(which) = astray
+            is_found(which) = is_there
+         end if
       else
          call follow_orbits(solver%points, members, sizes(solver%points, members, again), visitor, again, is_found)
       end if
@@ -271,7 +284,7 @@ contains
    !> Measure motions that are not periodic over a window; their error is what two halves of the window, or two numbers of steps,
    !> differ by.
    subroutine measure_windows(solver, equations, part, members, visitor, motions, answers, complete)
-      !> Solver, its points loaded.
+      !> Solver; it loads the points.
       type(lane_solver), intent(inout) :: solver
       !> Equations of motion of each point, shape (n).
       type(equations_type), intent(in) :: equations(:)

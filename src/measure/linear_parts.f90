@@ -12,7 +12,7 @@ module spurflex_measure_linear_parts
 
    public :: linear_parts, truncated_part
 
-   !> Linear parts that are kept for tiles to come; a few kilobytes each.
+   !> Linear parts that are kept for tiles to come; some ten kilobytes each.
    integer, parameter :: most_parts = 256
 
    !> Some of the modes of a linear part.
@@ -84,19 +84,21 @@ contains
    end subroutine find
 
    !> What the mesh feels of a linear part at some speed.
-   subroutine find_felt(self, part, frequency, least_share, few)
+   subroutine find_felt(self, part, frequency, least_share, moves, few)
       !> Linear parts.
       class(linear_parts), intent(inout) :: self
       !> The part.
       integer, intent(in) :: part
       !> Mesh frequency [rad/s], and share of the mesh deflection below which a mode is not felt; all are if it is negative.
       real(wp), intent(in) :: frequency, least_share
+      !> Modes that move at the start, so that the mesh feels them whatever their share, shape (modes).
+      logical, intent(in) :: moves(:)
       !> Index of the truncation.
       integer, intent(out) :: few
 
       logical :: felt(self%modal(part)%modes)
 
-      felt = felt_modes(self%shares(part), frequency, least_share)
+      felt = felt_modes(self%shares(part), frequency, least_share) .or. moves
       do few = self%truncations, 1, -1
          if (self%truncation(few)%part /= part) cycle
          if (all(self%truncation(few)%felt .eqv. felt)) return

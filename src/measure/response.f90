@@ -37,7 +37,7 @@ module spurflex_measure_response
       real(wp) :: error_estimate
       !> Largest modulus of the Floquet multipliers over the period of the motion [-].
       real(wp) :: floquet_magnitude
-      !> Largest Lyapunov exponent and its standard error [1/mesh period].
+      !> Largest Lyapunov exponent and its error [1/mesh period].
       real(wp) :: lyapunov_exponent, lyapunov_error
       !> Mesh periods of the motion, or `motion_...`.
       integer :: motion

@@ -2,10 +2,10 @@
 !>
 !> All modes are driven by one scalar and act on the others through one, the mesh deflection. A mode of a soft support gives way
 !> to the mesh frequency as a mass does, one of a stiff support hardly at all: what such a mode adds to the mesh deflection is
-!> far below what is asked for. Whether a motion is found, and whether it is stable, does not depend on it, and it follows from
-!> the mesh force afterwards, whatever displacements it has of its own.
+!> far below what is asked for. Whether a motion is found, and whether it is stable, does not depend on it if it decays, and it
+!> follows from the mesh force afterwards, whatever displacements it has of its own. What a start gives it is another matter.
 module spurflex_model_truncation
-   use spurflex_base_kinds, only: wp
+   use spurflex_base_kinds, only: wp, pi
    use spurflex_model_modal, only: modal_system
    implicit none
    private
@@ -13,12 +13,18 @@ module spurflex_model_truncation
    public :: mode_shares, new_mode_shares, felt_modes, truncated, complete_state, complete_monodromy
 
    !> Frequencies at which the shares are taken: so many to a factor of two, up to so many times the rate of the fastest mode, down
-   !> to so many below that of the slowest. A resonance is no narrower than some steps of this.
+   !> to so many below that of the slowest.
    integer, parameter :: per_octave = 16
    real(wp), parameter :: beyond_fastest = 4.0_wp, below_slowest = 16.0_wp
 
    !> Slowest part of a motion that counts, beside the mesh frequency: it may repeat after eight mesh periods.
    real(wp), parameter :: slowest_part = 1.0_wp/8.0_wp
+
+   !> What a mode may add to the mesh deflection under a steady force, beside its share: it only moves the mean of a motion.
+   real(wp), parameter :: steady_allowance = 10.0_wp
+
+   !> Decay over a mesh period, as a logarithm, that is none: such a mode must be seen to be stable.
+   real(wp), parameter :: no_decay = 1.0e-9_wp
 
    !> Shares of the modes of a linear part in what the mesh force does to the mesh deflection.
    type :: mode_shares
@@ -27,6 +33,8 @@ module spurflex_model_truncation
       real(wp) :: lowest = 1.0_wp
       !> Response of each mode over the largest of all, the most from each of the frequencies on, shape (modes, frequencies).
       real(wp), allocatable :: share(:, :)
+      !> The same under a steady force, and the rate at which each mode decays, shape (modes).
+      real(wp), allocatable :: steady_share(:), decay(:)
    end type mode_shares
 
 contains
@@ -38,15 +46,27 @@ contains
       !> The shares.
       type(mode_shares) :: self
 
-      real(wp) :: highest, responses(modal%modes)
+      real(wp), dimension(modal%modes) :: responses, peak
+      real(wp) :: highest, step
       integer :: n, i
 
+      self%decay = -real(modal%rate, wp)
+      responses = abs(modal%influence/modal%rate)
+      self%steady_share = responses/maxval(responses)
       self%lowest = minval(abs(modal%rate))/below_slowest
       highest = maxval(abs(modal%rate))*beyond_fastest
       n = 2 + ceiling(per_octave*log(highest/self%lowest)/log(2.0_wp))
       allocate (self%share(modal%modes, n))
+      ! Between two frequencies a mode may be in resonance.
+      peak = 0.5_wp*abs(modal%influence)/max(abs(real(modal%rate, wp)), epsilon(1.0_wp)*abs(modal%rate))
+      step = 2.0_wp**(1.0_wp/real(per_octave, wp))
       do i = n, 1, -1
-         responses = response_of(modal%influence, modal%rate, modal%is_real, self%lowest*2.0_wp**(real(i - 1, wp)/per_octave))
+         associate (frequency => self%lowest*step**(real(i, wp) - 0.5_wp))
+            responses = response_of(modal%influence, modal%rate, modal%is_real, frequency)
+            where (abs(aimag(modal%rate)) >= frequency/step .and. abs(aimag(modal%rate)) <= frequency*step)
+               responses = max(responses, peak)
+            end where
+         end associate
          self%share(:, i) = responses/maxval(responses)
          if (i < n) self%share(:, i) = max(self%share(:, i), self%share(:, i + 1))
       end do
@@ -73,7 +93,7 @@ contains
       end if
    end function response_of
 
-   !> Which modes the mesh feels at a speed.
+   !> Which modes the mesh feels at a speed; those that do not decay are among them, so that they are seen to be stable or not.
    pure function felt_modes(self, frequency, least_share) result(felt)
       !> The shares of the modes.
       type(mode_shares), intent(in) :: self
@@ -87,7 +107,8 @@ contains
       integer :: i
 
       i = 1 + int(per_octave*log(max(slowest_part*frequency/self%lowest, 1.0_wp))/log(2.0_wp))
-      felt = self%share(:, min(i, size(self%share, 2))) > least_share
+      felt = self%share(:, min(i, size(self%share, 2))) > least_share .or. self%steady_share > steady_allowance*least_share &
+             .or. self%decay*2.0_wp*pi <= no_decay*frequency
    end function felt_modes
 
    !> The linear part with some of its modes.
@@ -149,7 +170,8 @@ contains
       end do
    end function complete_state
 
-   !> A monodromy in all modes, nearly: the mesh does not feel the others, which decay on their own, but it moves with them.
+   !> A monodromy in all modes, nearly: the others decay on their own. What they and those that are felt do to each other is left
+   !> out.
    pure function complete_monodromy(few, few_room, felt, modal, time, room) result(monodromy)
       !> Monodromy in the modes that are felt, shape (2 few_room, 2 few_room).
       real(wp), intent(in) :: few(:, :)

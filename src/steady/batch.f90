@@ -123,14 +123,14 @@ contains
       do first = 1, batch, few
          power = 0.0_wp
          power(:, :n, :n) = matrix(first:first + few - 1, :, :)
-         call shrink(size(power, 2), power, it_does(first:first + few - 1))
+         call shrink(n, size(power, 2), power, it_does(first:first + few - 1))
       end do
    end subroutine contracting
 
    !> The same of a few matrices, which fit into the processor's first cache together with their squares.
-   pure subroutine shrink(n, power, it_does)
-      !> Rows, a multiple of `tile`.
-      integer, intent(in) :: n
+   pure subroutine shrink(rows, n, power, it_does)
+      !> Rows in use; rows, a multiple of `tile`, of which the last are zero.
+      integer, intent(in) :: rows, n
       !> The matrices; destroyed.
       real(wp), intent(inout) :: power(few, n, n)
       !> They do.
@@ -143,7 +143,9 @@ contains
 
       it_does = .false.
       logarithm = 0.0_wp
-      norm = sum(sum(power**2, 3), 2)
+      factor = 1.0_wp
+      square = power
+      call rescale(rows, n, square, factor, power, norm)
       do s = 0, most_squarings
          ! The power is kept near a norm of one and the logarithm of its norm apart, so that nothing overflows.
          do l = 1, few
@@ -165,11 +167,11 @@ contains
          is_far = factor > 0.0_wp .and. (norm > far_from_one .or. norm < 1.0_wp/far_from_one)
          if (any(is_far)) then
             square = power
-            call rescale(n, square, merge(1.0_wp/sqrt(max(norm, tiny(1.0_wp))), 1.0_wp, is_far), power, scaled_norm)
+            call rescale(rows, n, square, merge(1.0_wp/sqrt(max(norm, tiny(1.0_wp))), 1.0_wp, is_far), power, scaled_norm)
             where (is_far) factor = 1.0_wp/scaled_norm
          end if
          call multiply(n, power, square)
-         call rescale(n, square, factor, power, norm)
+         call rescale(rows, n, square, factor, power, norm)
       end do
    end subroutine shrink
 
@@ -221,10 +223,11 @@ contains
       end do
    end subroutine multiply
 
-   !> Matrices times a factor each, and their norms.
-   pure subroutine rescale(n, matrix, factor, scaled, norm)
-      !> Rows, an even number.
-      integer, intent(in) :: n
+   !> Matrices times a factor each, and their norms. Rows of zeros in the middle and at the end, room for modes that a point has
+   !> not, change no bit: each half of the rows has its own sum.
+   pure subroutine rescale(rows, n, matrix, factor, scaled, norm)
+      !> Rows in use, and rows.
+      integer, intent(in) :: rows, n
       !> Matrices.
       real(wp), intent(in) :: matrix(few, n, n)
       !> Factors.
@@ -234,23 +237,31 @@ contains
       !> Squares of the Frobenius norms of these.
       real(wp), intent(out) :: norm(few)
 
-      real(wp), dimension(few) :: odd, even
-      integer :: i, j, l
+      real(wp), dimension(few) :: upper, lower
+      integer :: half, i, j, l
 
-      odd = 0.0_wp
-      even = 0.0_wp
+      half = (rows + 1)/2
+      upper = 0.0_wp
+      lower = 0.0_wp
       do j = 1, n
-         do i = 1, n, 2
+         do i = 1, rows - half
             !GCC$ unroll 1
             do l = 1, few
                scaled(l, i, j) = factor(l)*matrix(l, i, j)
-               scaled(l, i + 1, j) = factor(l)*matrix(l, i + 1, j)
-               odd(l) = odd(l) + scaled(l, i, j)**2
-               even(l) = even(l) + scaled(l, i + 1, j)**2
+               scaled(l, half + i, j) = factor(l)*matrix(l, half + i, j)
+               upper(l) = upper(l) + scaled(l, i, j)**2
+               lower(l) = lower(l) + scaled(l, half + i, j)**2
             end do
          end do
+         if (half > rows - half) then
+            do l = 1, few
+               scaled(l, half, j) = factor(l)*matrix(l, half, j)
+               upper(l) = upper(l) + scaled(l, half, j)**2
+            end do
+         end if
+         scaled(:, rows + 1:, j) = 0.0_wp
       end do
-      norm = odd + even
+      norm = upper + lower
    end subroutine rescale
 
 end module spurflex_steady_batch

@@ -111,7 +111,7 @@ contains
       short = 0
       do k = 1, longest_period
          if (distances(periods) <= no_distance*scale) exit
-         if (distances(k) < merge(clearly_nearer, much_clearer, k <= soon_told)*distances(periods)) periods = k
+         if (distances(k) < merge(clearly_nearer, much_clearer, is_told(k))*distances(periods)) periods = k
          if (short > 0 .or. periods > longest_named) cycle
          if (distances(periods) <= near_recurrence*scale .and. is_new(periods)) short = periods
       end do
@@ -134,6 +134,16 @@ contains
           recurrence > merge(lies_apart, lies_far_apart, periods <= soon_told)*self%distance) periods = 0
 
    contains
+
+      !> A motion of so many mesh periods is told from a spiral or a torus, or there has been time enough.
+      pure function is_told(period) result(it_is)
+         !> Mesh periods.
+         integer, intent(in) :: period
+         !> It is.
+         logical :: it_is
+
+         it_is = period <= soon_told .or. transient%periods > trusted
+      end function is_told
 
       !> Newton's method has not been tried from so near yet.
       pure function is_new(period) result(it_is)

@@ -69,7 +69,8 @@ contains
       call transient%growth%smooth_exponent(smooth, smooth_error)
       vanishes = smooth_error < unknown .and. abs(smooth) <= no_growth
       at_last = transient%periods >= most_periods
-      still = merge(last_drift, merge(arrived_drift, plain_drift, periods >= fewest_periods), at_last)
+      still = plain_drift
+      if (periods >= fewest_periods) still = merge(last_drift, arrived_drift, at_last)
       if (periods >= fewest_periods) then
          neutral = neutral_growth/real(periods, wp)
          if (motion%lyapunov_exponent > neutral + significance*motion%lyapunov_error) then

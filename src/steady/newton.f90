@@ -116,6 +116,12 @@ contains
       end if
       ! The next step with a monodromy that is near would have to be smaller by this factor; the first one is trusted to lead there.
       if (pass == pass_near) found = found .or. near_shrinkage*item%length <= near_enough*scale
+      if (found .and. pass == pass_near .and. was_kept .and. .not. orbit%given) then
+         ! The monodromy may be that of a state that loses contact: here, where the map is affine, it can be had exactly.
+         found = .false.
+         item%pass = pass_linear
+      end if
+      if (item%pass == pass_linear) return
       if (found .or. item%iteration == most_iterations) return
       item%pass = pass
       if (roughly .and. pass == pass_linear .and. item%length <= near_step*scale) item%pass = pass_near

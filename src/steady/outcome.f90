@@ -69,7 +69,7 @@ module spurflex_steady_outcome
       integer :: periods_integrated = 0
       !> Largest modulus of the Floquet multipliers over the period of the motion; meaningless where it is not periodic [-].
       real(wp) :: floquet_magnitude = 0.0_wp
-      !> Largest Lyapunov exponent and its standard error [1/mesh period].
+      !> Largest Lyapunov exponent and its error [1/mesh period].
       real(wp) :: lyapunov_exponent = 0.0_wp, lyapunov_error = 0.0_wp
       !> State of the period map at a section of the motion, shape (size).
       real(wp), allocatable :: state(:)

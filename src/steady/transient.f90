@@ -177,7 +177,7 @@ contains
    pure function drift(transient) result(change)
       !> The transient.
       type(transient_type), intent(in) :: transient
-      !> The change; 1 while only one half has been seen.
+      !> The change; 1 while only one half has been seen, 0 before.
       real(wp) :: change
 
       real(wp) :: range(2)

@@ -6,13 +6,18 @@ module test_truncation
    use spurflex_base_error, only: library_error => error_type
    use spurflex_base_kinds, only: wp, pi
    use spurflex_base_text, only: to_text
+   use spurflex_integrate_lane_ensemble, only: lane_ensemble
    use spurflex_integrate_options, only: integrator_collocation, solver_options
+   use spurflex_measure_lane_search, only: search_in_lanes
+   use spurflex_measure_linear_parts, only: linear_parts
    use spurflex_measure_points, only: new_solver, respond_one, solver_type
    use spurflex_measure_response, only: motion_quasi_periodic, response, status_settled
-   use spurflex_model_equations, only: equations_type, new_equations
+   use spurflex_model_equations, only: equations_type, new_equations, rest_deviation
    use spurflex_model_modal, only: modal_system, new_modal_system
-   use spurflex_model_parameters, only: gearbox
-   use spurflex_model_truncation, only: complete_monodromy, complete_state, felt_modes, mode_shares, new_mode_shares, truncated
+   use spurflex_model_parameters, only: gear_pair, gearbox
+   use spurflex_model_truncation, only: complete_monodromy, complete_state, felt_modes, new_mode_shares, truncated
+   use spurflex_steady_orbit, only: periodic_orbit
+   use spurflex_steady_outcome, only: steady_motion
    use test_support, only: check, error_type, new_unittest, test_failed, unittest_type
    implicit none
    private
@@ -33,6 +38,8 @@ contains
                   new_unittest('what the mesh does not feel is small, soft to stiff', test_receptance), &
                   new_unittest('soft and stiff supports leave few modes', test_few), &
                   new_unittest('all modes, if all are asked for', test_all), &
+                  new_unittest('a mode that does not decay is seen to be stable or not', test_undamped), &
+                  new_unittest('from rest a soft support sways, and the mesh feels it', test_from_rest), &
                   new_unittest('states and monodromies are completed', test_complete), &
                   new_unittest('a torus on ever softer supports', test_soft_torus) &
                   ]
@@ -152,6 +159,64 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_all
+
+   !> Without damping no mode is left out; the tables have no frequency at which one would be infinite.
+   subroutine test_undamped(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      type(gear_pair) :: gears
+      type(gearbox) :: box
+      type(equations_type) :: equations
+      type(modal_system) :: modal
+      type(library_error), allocatable :: fault
+
+      gears = reference_gears()
+      gears%bearing_damping = 0.0_wp
+      gears%mesh%damping = 0.0_wp
+      box = reference_box()
+      box%damping_ratio = 0.0_wp
+      equations = new_equations(gears, box, reference_load(), flexible_point(1500.0_wp, 1.0e3_wp))
+      call new_modal_system(equations, modal, fault)
+      if (allocated(fault)) then
+         call test_failed(error, fault%message)
+         return
+      end if
+      ! What is left of the real parts of the eigenvalues is round-off, of either sign.
+      modal%rate = cmplx(0.0_wp, aimag(modal%rate), wp)
+      call check(error, all(felt_modes(new_mode_shares(modal), equations%frequency, least_share)), 'all modes')
+   end subroutine test_undamped
+
+   !> At the static equilibrium the mesh feels fewer modes of a soft support than when the gearbox is let go at rest, far away.
+   subroutine test_from_rest(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      type(equations_type) :: equations
+      type(linear_parts) :: parts
+      type(lane_ensemble) :: seekers
+      type(solver_options) :: options
+      type(no_attendant) :: nobody
+      type(steady_motion) :: motions(1)
+      type(periodic_orbit) :: orbits(1)
+      real(wp), allocatable :: position(:), velocity(:)
+      integer :: few(1), part, at_rest, modes(2)
+
+      options%integrator = integrator_collocation
+      equations = new_equations(reference_gears(), reference_box(), reference_load(), flexible_point(2600.0_wp, 1.0e4_wp))
+      call parts%find(equations, part)
+      do at_rest = 0, 1
+         position = spread(0.0_wp, 1, equations%n)
+         if (at_rest == 1) position = rest_deviation(equations)
+         velocity = spread(0.0_wp, 1, equations%n)
+         call search_in_lanes(seekers, parts, [equations], [part], 16, options, reshape(position, [equations%n, 1]), &
+                              reshape(velocity, [equations%n, 1]), nobody, few, motions, orbits)
+         modes(at_rest + 1) = parts%few(few(1))%modes
+         call check(error, motions(1)%status, status_settled, 'a motion is found')
+         if (allocated(error)) return
+      end do
+      call check(error, modes(1) == 5 .and. modes(2) > 5, 'modes from the equilibrium and from rest')
+   end subroutine test_from_rest
 
    !> Modes that are felt keep what they have, whatever room there is; the others balance the steady force and decay on their own.
    subroutine test_complete(error)
