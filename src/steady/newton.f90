@@ -119,9 +119,10 @@ contains
       if (found .and. pass == pass_near .and. was_kept .and. .not. orbit%given) then
          ! The monodromy may be that of a state that loses contact: here, where the map is affine, it can be had exactly.
          found = .false.
+         item%length = huge(1.0_wp)
          item%pass = pass_linear
+         return
       end if
-      if (item%pass == pass_linear) return
       if (found .or. item%iteration == most_iterations) return
       item%pass = pass
       if (roughly .and. pass == pass_linear .and. item%length <= near_step*scale) item%pass = pass_near
