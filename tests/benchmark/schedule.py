@@ -24,6 +24,8 @@ FORECAST_PARAMETERS = (
 )
 ATTENDANCE = ROOT / "src" / "sweep" / "attendance.f90"
 
+BOUND_TOLERANCE = 1e-6  # of a time that is bisected, far below what costs scatter by
+
 
 @dataclass(frozen=True)
 class Constants:
@@ -88,9 +90,13 @@ def cut(costs, length):
     Mirrors cut_rows for a grid of which every point is missing: tiles of a fixed size, row of tiles by row
     of tiles, softest support first; at the ends of the grid what is left of them.
     """
-    height, width = tile(length, costs.shape)
-    rows, speeds = (np.arange(0, n, step) for n, step in zip(costs.shape, (height, width), strict=True))
-    return np.add.reduceat(np.add.reduceat(costs, rows, axis=0), speeds, axis=1).reshape(-1)
+    return over_tiles(np.add, costs, tile(length, costs.shape)).reshape(-1)
+
+
+def over_tiles(function, values, size):
+    """A ufunc such as `np.add` over each tile of a size (rows, speeds), from the first row and speed on."""
+    rows, speeds = (np.arange(0, n, step) for n, step in zip(values.shape, size, strict=True))
+    return function.reduceat(function.reduceat(values, rows, axis=0), speeds, axis=1)
 
 
 class InOrder:
@@ -258,3 +264,39 @@ def replay(costs, ranks, machine, order=None):
 def lower_bound(costs, ranks):
     """No schedule of these pieces can be done earlier [s]."""
     return max(float(np.sum(costs)) / ranks, float(np.max(costs, initial=0.0)))
+
+
+def tile_bound(parts, ranks, write):
+    """No schedule of tiles can be done earlier [s], not even one that knew all costs before.
+
+    `parts`: what is shared at once, of each part a table of the costs of its points, (row, speed), by the
+    length of their tiles. A tile of the largest length may be cut into those of any other, each of which
+    takes `write` seconds more. A long time lets tiles be large, in which a point costs less, but none must
+    take longer than all: the least time in which the ranks, sharing evenly, can do what the best cuts cost.
+    """
+    cuts = [cuts_of_tiles(tables, write) for tables in parts]
+    too_short, long_enough = 0.0, sum(float(sums.max(axis=0).sum()) for sums, _ in cuts)
+    while long_enough - too_short > BOUND_TOLERANCE * long_enough:
+        seconds = 0.5 * (too_short + long_enough)
+        work = sum(np.where(dearest <= seconds, sums, np.inf).min(axis=0).sum() for sums, dearest in cuts)
+        if work <= ranks * seconds:
+            long_enough = seconds
+        else:
+            too_short = seconds
+    return long_enough
+
+
+def cuts_of_tiles(tables, write):
+    """What each of the largest tiles costs, and the dearest of its pieces: both (length, row, column)."""
+    shape = next(iter(tables.values())).shape
+    largest = tile(max(tables), shape)
+    sums, dearest = [], []
+    for length, costs in tables.items():
+        size = tile(length, shape)
+        if any(large % small for large, small in zip(largest, size, strict=True)):
+            raise ValueError(f"tiles of {max(tables)} points cannot be cut into tiles of {length}")
+        pieces = over_tiles(np.add, costs, size) + write
+        inside = tuple(large // small for large, small in zip(largest, size, strict=True))
+        sums.append(over_tiles(np.add, pieces, inside))
+        dearest.append(over_tiles(np.maximum, pieces, inside))
+    return np.array(sums), np.array(dearest)

@@ -20,6 +20,7 @@ from schedule import (
     lower_bound,
     replay,
     tile,
+    tile_bound,
 )
 
 FREE = Machine(latency=0.0, service=0.0, attendance=0.0, write=0.0)
@@ -307,3 +308,37 @@ def test_a_finer_grid_has_the_measured_costs():
     assert set(fine[0].ravel()) == set(tables[0].ravel())
     assert fine.mean() == pytest.approx(tables.mean(), rel=0.1)
     assert refined(tables[:, :1], (1, 20), random).shape == (2, 1, 20)
+
+
+def test_bound_of_tiles_of_equal_points_shares_them_evenly():
+    # Large tiles are cheapest, and none is too dear.
+    tables = {8: np.full((8, 64), 2.0), 256: np.full((8, 64), 1.0)}
+    assert tile_bound([tables], 2, 0.0) == pytest.approx(256.0, rel=1e-5)
+
+
+def test_bound_of_tiles_cuts_the_dear_one():
+    # One of two tiles is too dear for a rank: 32 pieces at twice the cost, 2 * 2560 + 256 shared by 8.
+    costs = np.ones((8, 64))
+    costs[:, :32] = 10.0
+    tables = {8: 2.0 * costs, 256: costs}
+    assert tile_bound([tables], 8, 0.0) == pytest.approx(5376.0 / 8, rel=1e-5)
+    # On two ranks nothing is won by cutting: the dear tile takes longer than half of everything.
+    assert tile_bound([tables], 2, 0.0) == pytest.approx(2560.0, rel=1e-5)
+
+
+def test_bound_of_tiles_is_the_dearest_piece_where_there_are_ranks_enough():
+    tables = {8: np.full((8, 64), 2.0), 256: np.full((8, 64), 1.0)}
+    assert tile_bound([tables], 1000, 0.5) == pytest.approx(16.5, rel=1e-5)
+
+
+def test_bound_of_parts_that_are_shared_at_once_is_below_one_after_the_other():
+    rigid = {1: np.full((1, 64), 4.0), 8: np.full((1, 64), 3.0)}
+    flexible = {8: np.full((8, 64), 2.0), 256: np.full((8, 64), 1.0)}
+    at_once = tile_bound([rigid, flexible], 1000, 0.0)
+    assert at_once == pytest.approx(16.0, rel=1e-5)
+    assert at_once < tile_bound([rigid], 1000, 0.0) + tile_bound([flexible], 1000, 0.0)
+
+
+def test_tiles_that_do_not_nest_are_refused():
+    with pytest.raises(ValueError, match="cannot be cut"):
+        tile_bound([{64: np.ones((12, 64)), 96: np.ones((12, 64))}], 2, 0.0)
