@@ -53,6 +53,12 @@ class Map:
     def __init__(self, name, measured, machine):
         self.name, self.costs, self.machine = name, measured, machine
         self.sizes = {part: measured.least(part).size for part in PHASES}
+        self.pieces = [
+            schedule.pieces_of(
+                dict(zip(measured.lengths[part], getattr(measured, part), strict=True)), machine.write
+            )
+            for part in PHASES
+        ]
         self.known = {}
 
     def chunks(self, part, length):
@@ -88,12 +94,8 @@ class Map:
 
         Of one in which the flexible points wait for the rigid twins, as they do, and of one in which not.
         """
-        write = self.machine.write
-        parts = [
-            dict(zip(self.costs.lengths[part], getattr(self.costs, part), strict=True)) for part in PHASES
-        ]
-        waiting = sum(schedule.tile_bound([part], ranks, write) for part in parts)
-        return waiting, schedule.tile_bound(parts, ranks, write)
+        waiting = sum(schedule.tile_bound([pieces], ranks) for pieces in self.pieces)
+        return waiting, schedule.tile_bound(self.pieces, ranks)
 
     def of_bound(self, constants, ranks):
         """The least possible time over that of all ranks together; what is lost is lost to the schedule."""

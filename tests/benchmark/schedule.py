@@ -24,7 +24,7 @@ FORECAST_PARAMETERS = (
 )
 ATTENDANCE = ROOT / "src" / "sweep" / "attendance.f90"
 
-BOUND_TOLERANCE = 1e-6  # of a time that is bisected, far below what costs scatter by
+BOUND_TOLERANCE = 1e-5  # of a time that is bisected, far below what costs scatter by
 
 
 @dataclass(frozen=True)
@@ -266,37 +266,48 @@ def lower_bound(costs, ranks):
     return max(float(np.sum(costs)) / ranks, float(np.max(costs, initial=0.0)))
 
 
-def tile_bound(parts, ranks, write):
+def tile_bound(parts, ranks):
     """No schedule of tiles can be done earlier [s], not even one that knew all costs before.
 
-    `parts`: what is shared at once, of each part a table of the costs of its points, (row, speed), by the
-    length of their tiles. A tile of the largest length may be cut into those of any other, each of which
-    takes `write` seconds more. A long time lets tiles be large, in which a point costs less, but none must
-    take longer than all: the least time in which the ranks, sharing evenly, can do what the best cuts cost.
+    `parts`: what is shared at once, of each part its `pieces_of`. A long time lets tiles be large, in which
+    a point costs less, but none must take longer than all: the least time in which the ranks, sharing
+    evenly, can do what the best cuts cost.
     """
-    cuts = [cuts_of_tiles(tables, write) for tables in parts]
-    too_short, long_enough = 0.0, sum(float(sums.max(axis=0).sum()) for sums, _ in cuts)
+    too_short, long_enough = 0.0, sum(cost_of_best_cuts(pieces, np.inf) for pieces in parts)
     while long_enough - too_short > BOUND_TOLERANCE * long_enough:
         seconds = 0.5 * (too_short + long_enough)
-        work = sum(np.where(dearest <= seconds, sums, np.inf).min(axis=0).sum() for sums, dearest in cuts)
-        if work <= ranks * seconds:
+        if sum(cost_of_best_cuts(pieces, seconds) for pieces in parts) <= ranks * seconds:
             long_enough = seconds
         else:
             too_short = seconds
     return long_enough
 
 
-def cuts_of_tiles(tables, write):
-    """What each of the largest tiles costs, and the dearest of its pieces: both (length, row, column)."""
-    shape = next(iter(tables.values())).shape
-    largest = tile(max(tables), shape)
-    sums, dearest = [], []
-    for length, costs in tables.items():
-        size = tile(length, shape)
-        if any(large % small for large, small in zip(largest, size, strict=True)):
-            raise ValueError(f"tiles of {max(tables)} points cannot be cut into tiles of {length}")
-        pieces = over_tiles(np.add, costs, size) + write
-        inside = tuple(large // small for large, small in zip(largest, size, strict=True))
-        sums.append(over_tiles(np.add, pieces, inside))
-        dearest.append(over_tiles(np.maximum, pieces, inside))
-    return np.array(sums), np.array(dearest)
+def pieces_of(tables, write):
+    """Size (rows, speeds) and costs (row, column) of the tiles of each length, the smallest first.
+
+    `tables`: costs of the points, (row, speed), by the length of their tiles; each tile takes `write`
+    seconds more. ValueError where tiles of a length cannot be cut into those of the one before.
+    """
+    pieces = []
+    for length, costs in sorted(tables.items()):
+        size = tile(length, costs.shape)
+        if pieces and any(large % small for large, small in zip(size, pieces[-1][0], strict=True)):
+            raise ValueError(f"tiles of {length} points cannot be cut into tiles of {pieces[-1][0]}")
+        pieces.append((size, over_tiles(np.add, costs, size) + write))
+    return pieces
+
+
+def cost_of_best_cuts(pieces, seconds):
+    """Least cost [s] of all tiles, each whole or cut, its parts again; none takes longer than `seconds`.
+
+    Infinite where one of the smallest does.
+    """
+    below, best = None, None
+    for size, costs in pieces:
+        whole = np.where(costs <= seconds, costs, np.inf)
+        if best is not None:
+            inside = tuple(large // small for large, small in zip(size, below, strict=True))
+            whole = np.minimum(whole, over_tiles(np.add, best, inside))
+        below, best = size, whole
+    return float(best.sum())

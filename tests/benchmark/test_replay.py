@@ -14,10 +14,12 @@ from schedule import (
     Forecast,
     Machine,
     constants_of_plan,
+    cost_of_best_cuts,
     cut,
     dearest_first,
     forecast,
     lower_bound,
+    pieces_of,
     replay,
     tile,
     tile_bound,
@@ -313,7 +315,7 @@ def test_a_finer_grid_has_the_measured_costs():
 def test_bound_of_tiles_of_equal_points_shares_them_evenly():
     # Large tiles are cheapest, and none is too dear.
     tables = {8: np.full((8, 64), 2.0), 256: np.full((8, 64), 1.0)}
-    assert tile_bound([tables], 2, 0.0) == pytest.approx(256.0, rel=1e-5)
+    assert tile_bound([pieces_of(tables, 0.0)], 2) == pytest.approx(256.0, rel=1e-5)
 
 
 def test_bound_of_tiles_cuts_the_dear_one():
@@ -321,24 +323,35 @@ def test_bound_of_tiles_cuts_the_dear_one():
     costs = np.ones((8, 64))
     costs[:, :32] = 10.0
     tables = {8: 2.0 * costs, 256: costs}
-    assert tile_bound([tables], 8, 0.0) == pytest.approx(5376.0 / 8, rel=1e-5)
+    assert tile_bound([pieces_of(tables, 0.0)], 8) == pytest.approx(5376.0 / 8, rel=1e-5)
     # On two ranks nothing is won by cutting: the dear tile takes longer than half of everything.
-    assert tile_bound([tables], 2, 0.0) == pytest.approx(2560.0, rel=1e-5)
+    assert tile_bound([pieces_of(tables, 0.0)], 2) == pytest.approx(2560.0, rel=1e-5)
 
 
 def test_bound_of_tiles_is_the_dearest_piece_where_there_are_ranks_enough():
     tables = {8: np.full((8, 64), 2.0), 256: np.full((8, 64), 1.0)}
-    assert tile_bound([tables], 1000, 0.5) == pytest.approx(16.5, rel=1e-5)
+    assert tile_bound([pieces_of(tables, 0.5)], 1000) == pytest.approx(16.5, rel=1e-5)
 
 
 def test_bound_of_parts_that_are_shared_at_once_is_below_one_after_the_other():
-    rigid = {1: np.full((1, 64), 4.0), 8: np.full((1, 64), 3.0)}
-    flexible = {8: np.full((8, 64), 2.0), 256: np.full((8, 64), 1.0)}
-    at_once = tile_bound([rigid, flexible], 1000, 0.0)
+    rigid = pieces_of({1: np.full((1, 64), 4.0), 8: np.full((1, 64), 3.0)}, 0.0)
+    flexible = pieces_of({8: np.full((8, 64), 2.0), 256: np.full((8, 64), 1.0)}, 0.0)
+    at_once = tile_bound([rigid, flexible], 1000)
     assert at_once == pytest.approx(16.0, rel=1e-5)
-    assert at_once < tile_bound([rigid], 1000, 0.0) + tile_bound([flexible], 1000, 0.0)
+    assert at_once < tile_bound([rigid], 1000) + tile_bound([flexible], 1000)
+
+
+def test_bound_of_tiles_cuts_no_more_of_a_tile_than_is_dear():
+    # A corner of 8 points is dear. At most 320 s a piece: the half without it stays whole, and three of the
+    # four quarters of the other half; the last one is cut into 8 dear and 24 cheap points.
+    costs = np.ones((8, 32))
+    costs[0, :8] = 20.0
+    tables = {8: 2.0 * costs, 32: 1.9 * costs, 128: 1.2 * costs, 256: costs}
+    cost = cost_of_best_cuts(pieces_of(tables, 0.0), 320.0)
+    assert cost == pytest.approx(128 * 1.2 + 96 * 1.9 + 8 * 40.0 + 24 * 2.0)
+    assert cost_of_best_cuts(pieces_of(tables, 0.0), 319.0) == np.inf
 
 
 def test_tiles_that_do_not_nest_are_refused():
     with pytest.raises(ValueError, match="cannot be cut"):
-        tile_bound([{64: np.ones((12, 64)), 96: np.ones((12, 64))}], 2, 0.0)
+        pieces_of({64: np.ones((12, 64)), 96: np.ones((12, 64))}, 0.0)
