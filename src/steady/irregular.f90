@@ -3,7 +3,7 @@ module spurflex_steady_irregular
    use spurflex_base_kinds, only: wp
    use spurflex_steady_lyapunov, only: unknown
    use spurflex_steady_outcome, only: steady_motion, status_settled, motion_quasi_periodic, motion_chaotic
-   use spurflex_steady_transient, only: transient_type, drift
+   use spurflex_steady_watch, only: watch_type
    implicit none
    private
 
@@ -35,24 +35,27 @@ module spurflex_steady_irregular
 contains
 
    !> A watch may decide on the class of a motion, so that a tangent is worth while.
-   pure function may_decide(transient, periods) result(it_may)
-      !> The transient, with what was seen in the watch before.
-      type(transient_type), intent(in) :: transient
+   pure function may_decide(before, periods) result(it_may)
+      !> What was seen in the watch before.
+      type(watch_type), intent(in) :: before
       !> Mesh periods of the watch.
       integer, intent(in) :: periods
       !> It may.
       logical :: it_may
 
-      it_may = periods >= merge(fewest_periods, fewest_if_plain, drift(transient) > far_drift)
+      it_may = periods >= merge(fewest_periods, fewest_if_plain, before%drift() > far_drift)
    end function may_decide
 
    !> The class of a motion in which nothing periodic was found; its status remains `status_missing` where it cannot be told.
    !>
    !> Whatever the periods watched, an exponent is called zero to the same resolution, that of the last watch: a tangent whose
    !> growth wanders less than that in a shorter watch need not be watched longer. Nor need one whose weighted growth vanishes.
-   pure subroutine classify(transient, most_periods, last_watch, motion)
-      !> The transient.
-      type(transient_type), intent(in) :: transient
+   !> What still drifts is on its way to this motion only if it drifts less and less.
+   pure subroutine classify(watch, at, most_periods, last_watch, motion)
+      !> What has been seen of it.
+      type(watch_type), intent(in) :: watch
+      !> Mesh periods integrated.
+      integer, intent(in) :: at
       !> Most periods; chaos is watched as long, for the sake of its exponent.
       integer, intent(in) :: most_periods
       !> Mesh periods over which it is watched the last time.
@@ -64,11 +67,11 @@ contains
       integer :: periods
       logical :: at_last, vanishes
 
-      call transient%growth%exponent(motion%lyapunov_exponent, motion%lyapunov_error, periods, wander)
+      call watch%growth%exponent(motion%lyapunov_exponent, motion%lyapunov_error, periods, wander)
       if (periods < fewest_if_plain) return
-      call transient%growth%smooth_exponent(smooth, smooth_error)
+      call watch%growth%smooth_exponent(smooth, smooth_error)
       vanishes = smooth_error < unknown .and. abs(smooth) <= no_growth
-      at_last = transient%periods >= most_periods
+      at_last = at >= most_periods
       still = plain_drift
       if (periods >= fewest_periods) still = merge(last_drift, arrived_drift, at_last)
       if (periods >= fewest_periods) then
@@ -80,7 +83,8 @@ contains
          end if
          vanishes = vanishes .or. wander <= neutral_growth*min(real(periods, wp)/(whole_watch*real(last_watch, wp)), 1.0_wp)
       end if
-      if (.not. vanishes .or. drift(transient) > still) return
+      if (.not. vanishes .or. watch%drift() > still) return
+      if (watch%drift() > plain_drift .and. .not. watch%comes_to_rest()) return
       motion%motion = motion_quasi_periodic
       motion%status = status_settled
       if (smooth_error >= unknown) return

@@ -17,7 +17,8 @@ module spurflex_steady_search
    use spurflex_steady_sections, only: weighted_norm
    use spurflex_steady_orbit, only: periodic_orbit, move_orbit, contact_is_kept
    use spurflex_steady_stability, only: find_stable_orbits, largest_multiplier
-   use spurflex_steady_transient, only: transient_type, begin_transient, watch_from_now, advance_transients
+   use spurflex_steady_transient, only: transient_type, begin_transient, watch_from_now, end_watch, advance_transients, &
+      watches
    implicit none
    private
 
@@ -25,6 +26,10 @@ module spurflex_steady_search
 
    !> Mesh periods after which the transient is first searched, if the start itself is no good; doubled each time.
    integer, parameter :: first_look = 12
+
+   !> Mesh periods at which the watches begin, each as long as all before it. The second one ends between two ends of the first:
+   !> what had not arrived when that began is told a third of the time earlier.
+   integer, parameter :: first_due(watches) = [0, 256]
 
    !> Mesh periods after which a transient is looked at again that should settle on a motion that keeps contact.
    integer, parameter :: glance = 2
@@ -82,34 +87,25 @@ contains
 
       type(transient_type) :: transients(size(motions))
       type(candidate_type) :: candidates(size(motions))
-      integer :: next_look, until, i
+      integer :: due(watches), i
       integer, allocatable :: left(:)
 
       do i = 1, size(motions)
          call begin_transient(points%weight(:, i), points%in_use(:, i), starts(:, i), transients(i))
       end do
       left = [(i, i=1, size(motions))]
-      next_look = first_look
+      due = first_due
       do
          call look_for_orbits(points, left, options, visitor, transients, candidates, motions, orbits)
          do i = 1, size(left)
             if (motions(left(i))%status /= status_missing .or. .not. transients(left(i))%sound) cycle
-            call classify(transients(left(i)), options%max_periods, last_watch(options%max_periods), motions(left(i)))
+            call tell_class(transients(left(i)), options%max_periods, motions(left(i)))
          end do
          left = pack(left, motions(left)%status == status_missing .and. transients(left)%sound &
                      .and. transients(left)%periods < options%max_periods)
          if (size(left) == 0) exit
-         if (next_look <= options%max_periods) then
-            until = merge(options%max_periods, next_look, 2*next_look > options%max_periods)
-            do i = 1, size(left)
-               ! A tangent is worth while in a watch that can decide on the class.
-               call watch_from_now(transients(left(i)), until, grows=may_decide(transients(left(i)), until - next_look/2))
-            end do
-            ! Those with tangents first: lanes without need not wait for lanes with.
-            left = [pack(left, transients(left)%grows), pack(left, .not. transients(left)%grows)]
-         end if
-         call advance_transients(points, left, spread(min(next_look, options%max_periods), 1, size(left)), transients, visitor)
-         next_look = 2*next_look
+         call begin_watches(options%max_periods, transients, left, due)
+         call advance_transients(points, left, spread(min(minval(due), options%max_periods), 1, size(left)), transients, visitor)
       end do
       do i = 1, size(motions)
          motions(i)%periods_integrated = motions(i)%periods_integrated + transients(i)%periods
@@ -121,6 +117,64 @@ contains
          motions(i)%reason = merge(reason_max_periods, reason_non_finite, transients(i)%sound)
       end do
    end subroutine find_steady_motions
+
+   !> The class of a motion that no periodic one was found for, by the watches over it.
+   subroutine tell_class(transient, most_periods, motion)
+      !> The transient.
+      type(transient_type), intent(in) :: transient
+      !> Most periods.
+      integer, intent(in) :: most_periods
+      !> The motion.
+      type(steady_motion), intent(inout) :: motion
+
+      type(steady_motion) :: told
+      integer :: w
+
+      do w = 1, watches
+         if (motion%status /= status_missing .or. .not. transient%watch(w)%is_on) cycle
+         told = motion
+         call classify(transient%watch(w), transient%periods, most_periods, last_watch(most_periods), told)
+         ! The first watch is the one that goes on to the end.
+         if (w == 1 .or. told%status /= status_missing) motion = told
+      end do
+   end subroutine tell_class
+
+   !> Begin the watches that are due, each as long as all that came before it.
+   subroutine begin_watches(most_periods, transients, members, due)
+      !> Most periods.
+      integer, intent(in) :: most_periods
+      !> The transients, shape (points).
+      type(transient_type), intent(inout) :: transients(:)
+      !> Which of them, shape (n); those with tangents first after.
+      integer, intent(inout) :: members(:)
+      !> Mesh period at which each watch ends and the next begins, shape (watches).
+      integer, intent(inout) :: due(:)
+
+      integer :: now, until, w, i
+      logical :: decides
+
+      now = minval(due)
+      do w = 1, watches
+         if (due(w) /= now) cycle
+         due(w) = merge(first_look, 2*now, now == 0)
+         until = due(w)
+         ! The first watch lasts to the end if another would not have the time; it is looked at before, too.
+         if (w == 1 .and. 2*until > most_periods) until = most_periods
+         do i = 1, size(members)
+            associate (transient => transients(members(i)))
+               if (due(w) <= most_periods) then
+                  ! A tangent is worth while in a watch that can decide on the class.
+                  decides = may_decide(transient%watch(w), until - now)
+                  call watch_from_now(transient, w, until, grows=decides)
+               else if (w > 1) then
+                  call end_watch(transient, w)
+               end if
+            end associate
+         end do
+      end do
+      ! Lanes without tangents need not wait for lanes with.
+      members = [pack(members, transients(members)%grows), pack(members, .not. transients(members)%grows)]
+   end subroutine begin_watches
 
    !> Look for stable periodic motions that the transients approach: those met before, then others.
    subroutine look_for_orbits(points, members, options, visitor, transients, candidates, motions, orbits)

@@ -3,15 +3,18 @@ module spurflex_steady_transient
    use spurflex_base_attendant, only: attendant
    use spurflex_base_kinds, only: wp
    use spurflex_integrate_ensemble, only: ensemble
-   use spurflex_steady_lyapunov, only: lyapunov_sum
    use spurflex_steady_sections, only: section_ring, longest_period, weighted_norm, find_norms
+   use spurflex_steady_watch, only: watch_type
    implicit none
    private
 
-   public :: transient_type, begin_transient, watch_from_now, advance_transients, drift
+   public :: transient_type, begin_transient, watch_from_now, end_watch, advance_transients, watches
 
    !> A state of this norm has left every physical range; far below overflow [m].
    real(wp), parameter :: diverged_norm = 1.0e100_wp
+
+   !> Watches over a transient that overlap.
+   integer, parameter :: watches = 2
 
    !> A transient under way.
    type :: transient_type
@@ -19,17 +22,13 @@ module spurflex_steady_transient
       real(wp), allocatable :: state(:), tangent(:)
       !> Latest sections.
       type(section_ring) :: ring
-      !> Growth of the tangent.
-      type(lyapunov_sum) :: growth
+      !> What is seen of it.
+      type(watch_type) :: watch(watches)
       !> Mesh periods integrated.
       integer :: periods = 0
       !> The state is finite.
       logical :: sound = .true.
-      !> Norms of the sections while the growth is summed: extremes over the first and the second half [m].
-      real(wp) :: low(2) = huge(1.0_wp), high(2) = -huge(1.0_wp)
-      !> Mesh period at which the second half begins.
-      integer :: half = 0
-      !> A tangent is carried and its growth is summed.
+      !> A tangent is carried, for the watches that sum its growth.
       logical :: grows = .false.
    end type transient_type
 
@@ -53,27 +52,38 @@ contains
       call transient%ring%add(start)
    end subroutine begin_transient
 
-   !> Watch anew: what came before was still on its way.
-   pure subroutine watch_from_now(transient, until, grows)
+   !> Begin a watch.
+   pure subroutine watch_from_now(transient, which, until, grows)
       !> The transient.
       type(transient_type), intent(inout) :: transient
-      !> Mesh period up to which it will be watched.
+      !> Which watch.
+      integer, intent(in) :: which
+      !> Mesh period up to which it lasts.
       integer, intent(in) :: until
       !> The growth of a tangent is wanted.
       logical, intent(in) :: grows
 
-      call transient%growth%reset(until - transient%periods)
-      transient%low = huge(1.0_wp)
-      transient%high = -huge(1.0_wp)
-      transient%half = (transient%periods + until)/2
+      call transient%watch(which)%begin(transient%periods, until, grows)
       if (grows .and. .not. transient%grows) then
          ! Any tangent turns into the direction that grows most, or decays least, but on a torus only slowly.
          associate (direction => transient%ring%return_direction())
             if (any(abs(direction) > 0.0_wp)) transient%tangent = direction
          end associate
       end if
-      transient%grows = grows
+      transient%grows = any(transient%watch%grows)
    end subroutine watch_from_now
+
+   !> End a watch that is not followed by another.
+   pure subroutine end_watch(transient, which)
+      !> The transient.
+      type(transient_type), intent(inout) :: transient
+      !> Which watch.
+      integer, intent(in) :: which
+
+      transient%watch(which)%is_on = .false.
+      transient%watch(which)%grows = .false.
+      transient%grows = any(transient%watch%grows)
+   end subroutine end_watch
 
    !> Integrate transients, each up to a period of its own. A seat that becomes free is taken by the next at once.
    subroutine advance_transients(points, members, until, transients, visitor)
@@ -160,31 +170,15 @@ contains
       !> The transient.
       type(transient_type), intent(inout) :: transient
 
-      integer :: which
+      integer :: w
 
-      if (transient%grows) call transient%growth%add(growth)
       transient%periods = transient%periods + 1
       ! Earlier ones will not be asked for.
       if (until - transient%periods <= longest_period) call transient%ring%add(state, norm)
       transient%sound = norm < diverged_norm
-      which = merge(1, 2, transient%periods <= transient%half)
-      transient%low(which) = min(transient%low(which), norm)
-      transient%high(which) = max(transient%high(which), norm)
+      do w = 1, watches
+         if (transient%watch(w)%is_on) call transient%watch(w)%see(transient%periods, norm, growth)
+      end do
    end subroutine see_section
-
-   !> How far a motion is still on its way: by how much its sections range over more, or less, in the second half of what has been
-   !> watched than in the first, beside the larger range.
-   pure function drift(transient) result(change)
-      !> The transient.
-      type(transient_type), intent(in) :: transient
-      !> The change; 1 while only one half has been seen, 0 before.
-      real(wp) :: change
-
-      real(wp) :: range(2)
-
-      ! Of what has not been seen, the lowest is huge and the highest is less.
-      range = max(transient%high, transient%low) - transient%low
-      change = abs(range(2) - range(1))/max(maxval(range), tiny(1.0_wp))
-   end function drift
 
 end module spurflex_steady_transient

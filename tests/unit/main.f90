@@ -26,6 +26,7 @@ program unit_tests
    use test_search, only: collect_search
    use test_kahraman_singh, only: collect_kahraman_singh
    use test_candidate, only: collect_candidate
+   use test_watch, only: collect_watch
    use test_harmonic, only: collect_harmonic
    use test_lanes, only: collect_lanes
    use test_spectrum, only: collect_spectrum
@@ -61,6 +62,7 @@ program unit_tests
             new_testsuite('crossings', collect_crossings), &
             new_testsuite('harmonic', collect_harmonic), &
             new_testsuite('candidate', collect_candidate), &
+            new_testsuite('watch', collect_watch), &
             new_testsuite('shooting', collect_shooting), &
             new_testsuite('search', collect_search), &
             new_testsuite('kahraman_singh', collect_kahraman_singh), &

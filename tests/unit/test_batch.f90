@@ -891,18 +891,19 @@ contains
       !> They are.
       logical :: same
 
-      real(wp) :: value(6), other(6)
-      integer :: periods(2)
+      real(wp) :: value(3), other(3)
+      integer :: periods(2), w
 
-      call a%growth%exponent(value(1), value(2), periods(1), value(3))
-      call b%growth%exponent(other(1), other(2), periods(2), other(3))
-      value(4) = a%ring%scale()
-      other(4) = b%ring%scale()
-      value(5:6) = 0.0_wp
-      other(5:6) = 0.0_wp
-      same = all(same_bits(a%state, b%state)) .and. all(same_bits(a%tangent, b%tangent)) .and. all(same_bits(value, other)) &
-             .and. all(same_bits(a%low, b%low)) .and. all(same_bits(a%high, b%high)) .and. a%periods == b%periods &
-             .and. periods(1) == periods(2) .and. (a%sound .eqv. b%sound)
+      same = all(same_bits(a%state, b%state)) .and. all(same_bits(a%tangent, b%tangent)) .and. a%periods == b%periods &
+             .and. (a%sound .eqv. b%sound) .and. same_bits(a%ring%scale(), b%ring%scale())
+      do w = 1, size(a%watch)
+         associate (one => a%watch(w), two => b%watch(w))
+            call one%growth%exponent(value(1), value(2), periods(1), value(3))
+            call two%growth%exponent(other(1), other(2), periods(2), other(3))
+            same = same .and. all(same_bits(value, other)) .and. periods(1) == periods(2) &
+                   .and. all(same_bits(one%low, two%low)) .and. all(same_bits(one%high, two%high))
+         end associate
+      end do
    end function same_transient
 
    !> Transients of different lengths, some with tangents, more than seats: together and one by one.
@@ -929,8 +930,10 @@ contains
       do part = 1, 2
          until = [(part*40 + mod(11*i, 37), i=1, 2*speeds)]
          do i = 1, 2*speeds
-            call watch_from_now(together(members(i)), until(i), mod(i, 3) == part)
-            call watch_from_now(alone(members(i)), until(i), mod(i, 3) == part)
+            call watch_from_now(together(members(i)), 1, until(i), mod(i, 3) == part)
+            call watch_from_now(together(members(i)), 2, until(i) + 9, mod(i, 2) == part)
+            call watch_from_now(alone(members(i)), 1, until(i), mod(i, 3) == part)
+            call watch_from_now(alone(members(i)), 2, until(i) + 9, mod(i, 2) == part)
          end do
          call advance_transients(points, members, until, together, nobody)
          do i = 2*speeds, 1, -1
