@@ -2,8 +2,8 @@
 program spurflex_main
    use mpi_f08, only: MPI_COMM_WORLD, mpi_abort, mpi_comm_rank, mpi_finalize, mpi_init
    use spurflex, only: action_check, action_help, action_keys, action_run, action_version, case_type, command_type, &
-      describe_ends, describe_plan, error_type, excerpt, exit_complete, exit_process, hasten_mpi_start, key_reference, logger, &
-      new_logger, parse_command_line, run_case, share_case, usage, version_text, watch_for_drain
+      describe_ends, describe_plan, error_type, excerpt, exit_complete, exit_process, hasten_mpi_end, hasten_mpi_start, &
+      key_reference, logger, new_logger, parse_command_line, run_case, share_case, usage, version_text, watch_for_drain
    implicit none
 
    type(command_type) :: command
@@ -43,6 +43,7 @@ program spurflex_main
       if (rank == 0 .or. error%alone) call log%complain(error%message)
       if (error%alone) call mpi_abort(MPI_COMM_WORLD, code)
    end if
+   call hasten_mpi_end()
    call mpi_finalize()
    if (rank == 0) call exit_process(code)
 end program spurflex_main
