@@ -88,36 +88,86 @@ contains
       !> The motions, shape (n).
       type(periodic_orbit), intent(inout) :: orbits(:)
 
-      type(periodic_orbit) :: shorter(1)
-      real(wp) :: states(points%seats, points%size), size_of_motion
-      integer :: i, k
-      logical :: is_shorter(1)
+      type(periodic_orbit), allocatable :: shorter(:)
+      integer, allocatable :: open(:)
+      real(wp) :: sizes(size(orbits))
+      integer :: repeats(size(orbits)), i
+      logical :: is_shorter(size(orbits))
 
-      states = 0.0_wp
       do i = 1, size(orbits)
-         if (.not. found(i) .or. orbits(i)%periods == 1) cycle
-         size_of_motion = max(weighted_norm(points%weight(:, members(i)), orbits(i)%state), points%half_backlash)
-         call points%seat(1, members(i))
-         states(1, :) = orbits(i)%state
-         do k = 1, orbits(i)%periods/2
-            call points%advance(states)
-            call visitor%attend()
-            orbits(i)%integrated = orbits(i)%integrated + 1
-            if (mod(orbits(i)%periods, k) /= 0) cycle
-            if (weighted_norm(points%weight(:, members(i)), states(1, :) - orbits(i)%state) > same_section*size_of_motion) cycle
-            shorter(1) = orbits(i)
-            shorter(1)%periods = k
-            call find_orbits(points, members(i:i), [size_of_motion], visitor, shorter, is_shorter)
-            orbits(i)%integrated = orbits(i)%integrated + shorter(1)%integrated
-            if (is_shorter(1)) then
-               shorter(1)%integrated = orbits(i)%integrated
-               orbits(i) = shorter(1)
-               exit
-            end if
-            call points%seat(1, members(i))
+         if (found(i)) sizes(i) = max(weighted_norm(points%weight(:, members(i)), orbits(i)%state), points%half_backlash)
+      end do
+      open = pack([(i, i=1, size(orbits))], found .and. orbits%periods > 1)
+      repeats = 0
+      do while (size(open) > 0)
+         call find_repeats(points, members, open, sizes, visitor, orbits, repeats)
+         open = pack(open, repeats(open) > 0)
+         shorter = orbits(open)
+         shorter%periods = repeats(open)
+         call find_orbits(points, members(open), sizes(open), visitor, shorter, is_shorter(:size(open)))
+         do i = 1, size(open)
+            shorter(i)%integrated = orbits(open(i))%integrated + shorter(i)%integrated
+            orbits(open(i))%integrated = shorter(i)%integrated
+            if (is_shorter(i)) orbits(open(i)) = shorter(i)
          end do
+         open = pack(open, .not. is_shorter(:size(open)))
       end do
    end subroutine reduce_periods
+
+   !> Where motions repeat before their period is over. A seat that becomes free is taken by the next motion at once.
+   subroutine find_repeats(points, members, which, sizes, visitor, orbits, repeats)
+      !> The points.
+      class(ensemble), intent(inout) :: points
+      !> Which of them the motions are of, shape (n).
+      integer, intent(in) :: members(:)
+      !> Which of the motions.
+      integer, intent(in) :: which(:)
+      !> Their sizes, shape (n) [m].
+      real(wp), intent(in) :: sizes(:)
+      !> Let in between the periods.
+      class(attendant), intent(inout) :: visitor
+      !> The motions, shape (n).
+      type(periodic_orbit), intent(inout) :: orbits(:)
+      !> Mesh periods after which each is known not to repeat before; those after which it does, 0 if it does not, shape (n).
+      integer, intent(inout) :: repeats(:)
+
+      real(wp) :: states(points%seats, points%size)
+      integer :: seated(points%seats), done(points%seats), next, k
+      logical :: same
+
+      states = 0.0_wp
+      seated = 0
+      next = 1
+      do
+         do k = 1, points%seats
+            if (seated(k) > 0 .or. next > size(which)) cycle
+            seated(k) = which(next)
+            done(k) = 0
+            call points%seat(k, members(seated(k)))
+            states(k, :) = orbits(seated(k))%state
+            next = next + 1
+         end do
+         if (all(seated == 0)) exit
+         call points%advance(states)
+         do k = 1, points%seats
+            if (seated(k) > 0) then
+               done(k) = done(k) + 1
+               associate (p => seated(k), orbit => orbits(seated(k)))
+                  orbit%integrated = orbit%integrated + 1
+                  same = done(k) > repeats(p) .and. mod(orbit%periods, done(k)) == 0
+                  if (same) same = weighted_norm(points%weight(:, members(p)), states(k, :) - orbit%state) &
+                                   <= same_section*sizes(p)
+                  if (.not. same .and. done(k) < orbit%periods/2) cycle
+                  repeats(p) = merge(done(k), 0, same)
+               end associate
+               seated(k) = 0
+            end if
+            ! An empty seat is integrated with the others, always from zero, so that nothing can overflow.
+            states(k, :) = 0.0_wp
+         end do
+         call visitor%attend()
+      end do
+   end subroutine find_repeats
 
    !> Keep the orbits whose multipliers all lie inside the unit circle.
    subroutine keep_stable(orbits, found)
