@@ -50,7 +50,7 @@ contains
    !>
    !> Whatever the periods watched, an exponent is called zero to the same resolution, that of the last watch: a tangent whose
    !> growth wanders less than that in a shorter watch need not be watched longer. Nor need one whose weighted growth vanishes.
-   !> What still drifts is on its way to this motion only if it drifts less and less.
+   !> What still drifts is on its way to this motion only if it drifts less and less; else it is left to a later watch.
    pure subroutine classify(watch, at, most_periods, last_watch, motion)
       !> What has been seen of it.
       type(watch_type), intent(in) :: watch
@@ -84,7 +84,8 @@ contains
          vanishes = vanishes .or. wander <= neutral_growth*min(real(periods, wp)/(whole_watch*real(last_watch, wp)), 1.0_wp)
       end if
       if (.not. vanishes .or. watch%drift() > still) return
-      if (watch%drift() > plain_drift .and. .not. watch%comes_to_rest()) return
+      ! In the end there is no later watch to be left to.
+      if (.not. at_last .and. watch%drift() > plain_drift .and. .not. watch%comes_to_rest()) return
       motion%motion = motion_quasi_periodic
       motion%status = status_settled
       if (smooth_error >= unknown) return
