@@ -1,5 +1,8 @@
 """The map of figure 9, whole program: wall time, efficiency of two ranks, memory, start of a finished deck.
 
+Twice with what figures 9 and 10 need, products = 'map', and once with the products of the deck itself,
+which are multipliers and exponents too. The time is judged where the target is set: at 1e-3.
+
 What the machine leaves to two is measured beside it: two runs of one rank at once, not bound to cores, which
 share nothing else. Their speed beside that of one alone compares with the efficiency of two ranks.
 Writes map.json and the figure map.
@@ -13,39 +16,42 @@ import harness
 import numpy as np
 from harness import style
 
-TOLERANCES = (1e-3, 1e-6)
+# Tolerance, and products: none given are those of the deck.
+CASES = ((1e-3, {"products": "map"}), (1e-6, {"products": "map"}), (1e-6, {}))
 RANKS = (1, 2)
 QUICK_GRID = {"speed_count": 58, "stiffness_count": 10}
 
-WALL_LIMIT = 2.0  # s on two ranks
+WALL_LIMIT, WALL_TOLERANCE = 2.0, 1e-3  # s on two ranks
 EFFICIENCY_LIMIT = 0.95
 MEMORY_LIMIT = 150.0  # MB a rank
 RERUN_LIMIT = 0.3  # s
 
 
-def measure(program, options, tolerance):
-    """Everything about the map with one tolerance."""
-    name = f"map-{tolerance:.0e}"
-    grid = QUICK_GRID if options.quick else {}
+def measure(program, options, tolerance, products):
+    """Everything about the map with one tolerance and some products."""
+    label = f"tolerance {tolerance:g}" + (", map" if products else ", all")
+    name = f"map-{tolerance:.0e}" + ("" if products else "-all")
+    values = {"tolerance": tolerance, **products, **(QUICK_GRID if options.quick else {})}
     runs = {ranks: [] for ranks in RANKS}
     reruns = {ranks: [] for ranks in RANKS}
     at_once = []
     for pair in range(options.repeats):
         # Both orders in turn, so that a drift of the machine hits both alike.
         for ranks in RANKS if pair % 2 == 0 else reversed(RANKS):
-            deck, result = program.prepare(name, tolerance=tolerance, **grid)
+            deck, result = program.prepare(name, **values)
             runs[ranks].append(program.run(deck, ranks))
             reruns[ranks].append(program.run(deck, ranks))
             wall = runs[ranks][-1].wall_seconds
-            print(f"tolerance {tolerance:g}, {ranks} ranks: {wall:.2f} s", flush=True)
-        at_once.append(two_at_once(program, name, tolerance=tolerance, **grid))
-        print(f"tolerance {tolerance:g}, two runs at once: {at_once[-1]:.2f} s", flush=True)
+            print(f"{label}, {ranks} ranks: {wall:.2f} s", flush=True)
+        at_once.append(two_at_once(program, name, **values))
+        print(f"{label}, two runs at once: {at_once[-1]:.2f} s", flush=True)
     memory = {}
     for ranks in RANKS:
-        deck, result = program.prepare(name, tolerance=tolerance, **grid)
+        deck, result = program.prepare(name, **values)
         memory[ranks] = program.run(deck, ranks, memory=True).memory_megabytes
     one, two = runs[1], runs[2]
     report = {
+        "label": label,
         "tolerance": tolerance,
         "wall_seconds": {n: harness.spread(r.wall_seconds for r in runs[n]) for n in RANKS},
         "program_seconds": {n: spread_known(r.program_seconds for r in runs[n]) for n in RANKS},
@@ -90,17 +96,19 @@ def efficiency(one, two, clock):
 
 
 def targets_of(report):
-    """The targets, for one tolerance."""
+    """The targets, for one of the cases."""
     wall, again = (report[k][2]["median"] for k in ("wall_seconds", "rerun_seconds"))
     efficient = report["efficiency_of_two_ranks"]["pairs"]["median"]
     largest = max(max(peaks) for peaks in report["memory_megabytes_by_rank"].values())
-    targets = {
-        "wall time on 2 ranks [s]": harness.judge(wall, WALL_LIMIT),
+    targets = {}
+    if report["tolerance"] == WALL_TOLERANCE:
+        targets["wall time on 2 ranks [s]"] = harness.judge(wall, WALL_LIMIT)
+    targets |= {
         "efficiency of 2 ranks": harness.judge(efficient, EFFICIENCY_LIMIT, at_most=False),
         "memory of the largest rank [MB]": harness.judge(largest, MEMORY_LIMIT),
         "finished deck again on 2 ranks [s]": harness.judge(again, RERUN_LIMIT),
     }
-    return {f"tolerance {report['tolerance']:g}: {name}": verdict for name, verdict in targets.items()}
+    return {f"{report['label']}: {name}": verdict for name, verdict in targets.items()}
 
 
 def plot(reports, options):
@@ -115,19 +123,18 @@ def plot(reports, options):
             times.bar(place, wall["median"], 0.32, color=colours[ranks], label=label)
             times.plot(np.full(len(wall["values"]), place), wall["values"], "o", color="black", mfc="white")
     times.axhline(WALL_LIMIT, color=style.GREY, ls="--", label="target for 2 ranks")
-    times.set_xticks(range(len(reports)), [f"tolerance {r['tolerance']:g}" for r in reports])
+    times.set_xticks(range(len(reports)), [r["label"].replace(", ", "\n") for r in reports])
     times.set_ylabel("wall time of the whole program [s]")
     times.set_ylim(0.0, 1.35 * max(r["wall_seconds"][n]["max"] for r in reports for n in RANKS))
     times.legend(loc="upper center", ncols=3)
 
-    markers = {0: "o", 1: "s"}
+    looks = (("o", style.GREEN), ("s", style.ORANGE), ("^", style.BLUE))
     names = list(dict.fromkeys(k for r in reports for k in r["outcome"]["flexible"]["motion"]))
     for number, report in enumerate(reports):
         counts = [report["outcome"]["flexible"]["motion"].get(k, np.nan) for k in names]
-        places = np.arange(len(names)) + (number - 0.5) * 0.2
-        colour = (style.GREEN, style.ORANGE)[number]
-        label = f"tolerance {report['tolerance']:g}"
-        outcome.plot(places, counts, markers[number], color=colour, label=label)
+        places = np.arange(len(names)) + (number - 1) * 0.2
+        marker, colour = looks[number]
+        outcome.plot(places, counts, marker, color=colour, label=report["label"])
     outcome.set_xticks(range(len(names)), [n.replace("_", " ") for n in names], rotation=60, ha="right")
     outcome.set(ylabel="points of the flexible support [1]", yscale="log")
     outcome.legend()
@@ -143,7 +150,7 @@ def main(argv=None):
     # The program and its libraries come into the cache of the system before anything is timed.
     deck, _ = program.prepare("map-warm", speed_count=10, stiffness_count=2)
     program.run(deck, max(RANKS))
-    measured = [measure(program, options, tolerance) for tolerance in TOLERANCES]
+    measured = [measure(program, options, *case) for case in CASES]
     reports = [report for report, _ in measured]
     targets = {}
     for report in [] if options.quick else reports:  # they are for the whole map
