@@ -63,7 +63,7 @@ contains
       !> The motion.
       type(steady_motion), intent(inout) :: motion
 
-      real(wp) :: neutral, wander, smooth, smooth_error, still
+      real(wp) :: neutral, wander, smooth, smooth_error, drift, still
       integer :: periods
       logical :: at_last, vanishes
 
@@ -83,9 +83,10 @@ contains
          end if
          vanishes = vanishes .or. wander <= neutral_growth*min(real(periods, wp)/(whole_watch*real(last_watch, wp)), 1.0_wp)
       end if
-      if (.not. vanishes .or. watch%drift() > still) return
+      drift = watch%drift()
+      if (.not. vanishes .or. drift > still) return
       ! In the end there is no later watch to be left to.
-      if (.not. at_last .and. watch%drift() > plain_drift .and. .not. watch%comes_to_rest()) return
+      if (.not. at_last .and. drift > plain_drift .and. .not. watch%comes_to_rest()) return
       motion%motion = motion_quasi_periodic
       motion%status = status_settled
       if (smooth_error >= unknown) return

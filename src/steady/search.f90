@@ -151,7 +151,6 @@ contains
       integer, intent(inout) :: due(:)
 
       integer :: now, until, w, i
-      logical :: decides
 
       now = minval(due)
       do w = 1, watches
@@ -164,8 +163,7 @@ contains
             associate (transient => transients(members(i)))
                if (due(w) <= most_periods) then
                   ! A tangent is worth while in a watch that can decide on the class.
-                  decides = may_decide(transient%watch(w), until - now)
-                  call watch_from_now(transient, w, until, grows=decides)
+                  call watch_from_now(transient, w, until, grows=may_decide(transient%watch(w), until - now))
                else if (w > 1) then
                   call end_watch(transient, w)
                end if

@@ -94,14 +94,15 @@ contains
       integer :: repeats(size(orbits)), i
       logical :: is_shorter(size(orbits))
 
-      do i = 1, size(orbits)
-         if (found(i)) sizes(i) = max(weighted_norm(points%weight(:, members(i)), orbits(i)%state), points%half_backlash)
-      end do
       open = pack([(i, i=1, size(orbits))], found .and. orbits%periods > 1)
+      do i = 1, size(open)
+         sizes(open(i)) = max(weighted_norm(points%weight(:, members(open(i))), orbits(open(i))%state), points%half_backlash)
+      end do
       repeats = 0
       do while (size(open) > 0)
          call find_repeats(points, members, open, sizes, visitor, orbits, repeats)
          open = pack(open, repeats(open) > 0)
+         if (size(open) == 0) exit
          shorter = orbits(open)
          shorter%periods = repeats(open)
          call find_orbits(points, members(open), sizes(open), visitor, shorter, is_shorter(:size(open)))

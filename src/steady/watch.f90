@@ -18,8 +18,8 @@ module spurflex_steady_watch
       real(wp) :: low(2) = huge(1.0_wp), high(2) = -huge(1.0_wp)
       !> Mesh period at which the second half begins.
       integer :: half = 0
-      !> Range of the norms over the second half of the watch before; negative if there was none [m].
-      real(wp) :: before = -1.0_wp
+      !> Range of the norms over the second half of the watch before; zero if there was none [m].
+      real(wp) :: before = 0.0_wp
    contains
       !> Watch anew.
       procedure :: begin
@@ -45,7 +45,7 @@ contains
       real(wp) :: range(2)
 
       range = ranges(self)
-      self%before = merge(range(2), -1.0_wp, self%is_on .and. self%high(2) >= self%low(2))
+      self%before = range(2)
       self%is_on = .true.
       self%grows = grows
       call self%growth%reset(until - from)
@@ -86,18 +86,17 @@ contains
    end function drift
 
    !> The drift is no more than that into this watch: a motion that arrives slows down, one that leaves for another does not.
+   !> Where nothing was seen before, that is 1.
    pure function comes_to_rest(self) result(it_does)
       !> Watch.
       class(watch_type), intent(in) :: self
-      !> It does, or nothing is known of before.
+      !> It does.
       logical :: it_does
 
       real(wp) :: range(2)
 
-      it_does = self%before < 0.0_wp
-      if (it_does) return
       range = ranges(self)
-      it_does = change_of(range(1), range(2)) <= change_of(self%before, range(1))
+      it_does = self%drift() <= change_of(self%before, range(1))
    end function comes_to_rest
 
    !> Ranges of the norms over both halves; zero of one that has not been seen [m].
