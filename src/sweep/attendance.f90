@@ -1,4 +1,4 @@
-!> What a rank does now and then during long work: answer other ranks and say how far the sweep is.
+!> What a rank does now and then during long work: answer other ranks, say how far the sweep is, let MPI go on.
 module spurflex_sweep_attendance
    use spurflex_base_attendant, only: attendant
    use spurflex_base_clock, only: steady_seconds
@@ -12,12 +12,14 @@ module spurflex_sweep_attendance
 
    public :: sweep_attendant, outcome_text
 
-   !> Seconds between two looks at the messages: a rank that asks waits for half of it.
+   !> Seconds between two looks of rank 0 at the messages: a rank that asks waits for half of it.
    real(wp), parameter :: interval = 0.2e-3_wp
+   !> Seconds between two calls of MPI on the other ranks: what all ranks share goes from one to the next meanwhile.
+   real(wp), parameter :: side_interval = 0.1_wp
 
    !> The scheduler and the logger of a rank.
    type, extends(attendant) :: sweep_attendant
-      !> Hands out chunks.
+      !> Hands out pieces.
       type(scheduler) :: schedule
       !> Hears of the progress.
       type(logger), pointer :: log => null()
@@ -40,7 +42,7 @@ contains
       real(wp) :: now
 
       now = steady_seconds()
-      if (now - self%last < interval) return
+      if (now - self%last < merge(interval, side_interval, self%schedule%hands_out())) return
       self%last = now
       call self%schedule%serve()
       if (.not. self%log%is_due(sum(int(self%schedule%total, i8)), self%points)) return

@@ -3,7 +3,7 @@ module spurflex_sweep_checkpoint
    use mpi_f08, only: MPI_Comm, MPI_IN_PLACE, MPI_INTEGER8, MPI_LOGICAL, MPI_MAX, mpi_allreduce, mpi_bcast, mpi_comm_rank
    use spurflex_base_checksum, only: extended
    use spurflex_base_error, only: error_type, fatal_error, exit_mismatch, exit_stopped
-   use spurflex_base_kinds, only: i4, i8, wp
+   use spurflex_base_kinds, only: i4, i8
    use spurflex_external_file_watch, only: watch_file, save_contents, end_watch
    use spurflex_external_posix, only: check_writable, is_link
    use spurflex_io_agreement, only: share_error
@@ -14,7 +14,7 @@ module spurflex_sweep_checkpoint
    use spurflex_measure_response, only: response, status_missing, status_diverged
    use spurflex_sweep_plan, only: is_chained
    use spurflex_sweep_timekeeper, only: timekeeper, stop_file
-   use spurflex_sweep_worker, only: no_twin
+   use spurflex_sweep_twins, only: twin_table, new_twin_table
    implicit none
    private
 
@@ -175,7 +175,7 @@ contains
    end subroutine check_agreement
 
    !> Read which points are missing, and the rigid twins that are there.
-   subroutine find_missing(results, case, rigid_status, status, rigid_deformation, error)
+   subroutine find_missing(results, case, rigid_status, status, twins, error)
       !> Open file.
       type(results_file), intent(in) :: results
       !> Case.
@@ -184,14 +184,12 @@ contains
       integer, allocatable, intent(out) :: rigid_status(:)
       !> Status of the flexible points, shape (speed, stiffness); empty if they are not asked for.
       integer, allocatable, intent(out) :: status(:, :)
-      !> Largest bearing deformations of the rigid twins and their relative error, shape (3, speed); unallocated if they are
-      !> not asked for.
-      real(wp), allocatable, intent(out) :: rigid_deformation(:, :)
+      !> The rigid twins; none if they are not asked for.
+      type(twin_table), intent(out) :: twins
       !> Set where the file cannot be read.
       type(error_type), allocatable, intent(out) :: error
 
       type(response), allocatable :: rigid(:)
-      integer :: i
 
       allocate (rigid_status(merge(case%sweep%speed_count, 0, case%sweep%rigid)))
       allocate (status(merge(case%sweep%speed_count, 0, case%sweep%flexible), &
@@ -200,11 +198,7 @@ contains
       if (allocated(error) .or. .not. case%sweep%rigid) return
       allocate (rigid(case%sweep%speed_count))
       call read_rigid(results, rigid, error)
-      allocate (rigid_deformation(3, case%sweep%speed_count), source=no_twin)
-      do i = 1, size(rigid)
-         if (rigid(i)%status == status_missing .or. rigid(i)%status == status_diverged) cycle
-         rigid_deformation(:, i) = [rigid(i)%bearing_deformation_max, rigid(i)%error_estimate]
-      end do
+      if (.not. allocated(error)) twins = new_twin_table(rigid, as_a_whole=is_chained(case))
    end subroutine find_missing
 
 end module spurflex_sweep_checkpoint

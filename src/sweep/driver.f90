@@ -1,7 +1,6 @@
-!> A whole run: open the file, solve the rigid twins, solve the grid, close the file.
+!> A whole run: open the file, solve what is missing in it, close the file.
 module spurflex_sweep_driver
-   use mpi_f08, only: MPI_Comm, MPI_IN_PLACE, MPI_DOUBLE_PRECISION, MPI_MIN, MPI_INTEGER, MPI_CHARACTER, &
-      mpi_allreduce, mpi_bcast, mpi_comm_rank, mpi_comm_size
+   use mpi_f08, only: MPI_Comm, MPI_DOUBLE_PRECISION, MPI_INTEGER, MPI_CHARACTER, mpi_bcast, mpi_comm_rank, mpi_comm_size
    use spurflex_base_error, only: error_type, exit_complete, exit_failed_points, exit_stopped
    use spurflex_base_kinds, only: wp
    use spurflex_base_text, only: to_text, fixed_text
@@ -13,12 +12,14 @@ module spurflex_sweep_driver
    use spurflex_io_log, only: logger
    use spurflex_io_results, only: results_file, close_results, describe_failures
    use spurflex_measure_effort, only: effort_type, stage_write
-   use spurflex_measure_response, only: status_missing, status_settled, status_diverged
+   use spurflex_measure_response, only: status_settled, status_diverged
    use spurflex_sweep_attendance, only: outcome_text
    use spurflex_sweep_checkpoint, only: check_agreement, diverged_before, find_missing, look_after_file, open_file
-   use spurflex_sweep_plan, only: chunk_type, plan_row, plan_grid, points_of, describe_plan
+   use spurflex_sweep_chunk, only: chunk_type, points_of
+   use spurflex_sweep_plan, only: plan_sweep, describe_plan
    use spurflex_sweep_schedule, only: outcomes
    use spurflex_sweep_timekeeper, only: timekeeper, new_timekeeper, load_text, describe_ends, stop_file
+   use spurflex_sweep_twins, only: twin_table
    use spurflex_sweep_worker, only: work_on_chunks
    implicit none
    private
@@ -77,7 +78,9 @@ contains
       character(len=:), allocatable :: load, failures
       real(wp) :: window, begun, opening, writing
       integer, allocatable :: rigid_status(:), status(:, :)
-      real(wp), allocatable :: rigid_deformation(:, :)
+      type(twin_table), asynchronous :: twins
+      type(chunk_type), allocatable, target :: chunks(:)
+      type(effort_type) :: effort
       integer :: ranks, total(outcomes), left
 
       code = exit_complete
@@ -89,7 +92,7 @@ contains
       begun = log%elapsed()
       call open_file(results, keeper, case, comm, fresh, error)
       if (allocated(error)) return
-      call find_missing(results, case, rigid_status, status, rigid_deformation, error)
+      call find_missing(results, case, rigid_status, status, twins, error)
       ! No rank may write before every rank has read which points are missing: sharing errors waits for all.
       call share_error(comm, error)
       if (.not. allocated(error)) call check_agreement(case, comm, rigid_status, status, error)
@@ -103,18 +106,21 @@ contains
       left = 0
       window = 0.0_wp
       writing = 0.0_wp
-      if (any(rigid_status == status_missing)) then
-         call work_through(plan_row(case, rigid_status, ranks), 'rigid support')
-         if (allocated(error)) return
-         call mpi_allreduce(MPI_IN_PLACE, rigid_deformation, size(rigid_deformation), MPI_DOUBLE_PRECISION, MPI_MIN, comm)
-      end if
-      if (any(status == status_missing)) then
-         if (left == 0) then
-            call work_through(plan_grid(case, status, ranks), 'flexible support')
-            if (allocated(error)) return
-         else
-            left = left + points_of(plan_grid(case, status, ranks))
+      chunks = plan_sweep(case, rigid_status, status, ranks)
+      if (size(chunks) > 0) then
+         begun = log%elapsed()
+         call log%begin(to_text(sum(points_of(chunks)))//' points on '//to_text(ranks)//' ranks')
+         call work_on_chunks(case, chunks, comm, results, log, keeper, twins, total, effort, error)
+         if (allocated(error)) then
+            error%alone = .true.
+            return
          end if
+         call mpi_bcast(total, outcomes, MPI_INTEGER, 0, comm)
+         call log%say(effort%describe())
+         writing = effort%seconds(stage_write)
+         left = sum(points_of(chunks)) - sum(total)
+         window = log%elapsed() - begun
+         if (left == 0) call log%finish()
       end if
       if (left == 0 .and. sum(total) == 0) call log%say('nothing to do: every point of '//case%output%file//' is there')
       total(status_diverged) = total(status_diverged) + diverged_before(case, reshape(rigid_status, [size(rigid_status), 1])) &
@@ -139,33 +145,6 @@ contains
       if (left > 0) call log%say(advice())
 
    contains
-
-      !> Work through the chunks of one support; counts up `total`, and `left` on every rank.
-      subroutine work_through(chunks, support)
-         !> The chunks, the same on every rank.
-         type(chunk_type), intent(in) :: chunks(:)
-         !> Name of the support.
-         character(len=*), intent(in) :: support
-
-         type(effort_type) :: effort
-         integer :: finished(outcomes)
-         real(wp) :: begins
-
-         begins = log%elapsed()
-         call log%begin(support//': '//to_text(points_of(chunks))//' points on '//to_text(ranks)//' ranks')
-         call work_on_chunks(case, chunks, comm, results, log, keeper, rigid_deformation, finished, effort, error)
-         if (allocated(error)) then
-            error%alone = .true.
-            return
-         end if
-         call mpi_bcast(finished, outcomes, MPI_INTEGER, 0, comm)
-         total = total + finished
-         call log%say(effort%describe())
-         writing = writing + effort%seconds(stage_write)
-         left = left + points_of(chunks) - sum(finished)
-         window = window + log%elapsed() - begins
-         if (left == 0) call log%finish()
-      end subroutine work_through
 
       !> How to go on after an early end. All ranks call this together.
       function advice() result(text)

@@ -1,9 +1,10 @@
-!> What has to be computed: the points of the grid that are missing, cut into chunks that are handed to ranks.
+!> What has to be computed: the points of the grid that are missing, cut into chunks.
 !>
 !> A chunk is a tile of neighbouring speeds and support stiffnesses: dear points, which lie together, fill the lanes of the
-!> processor's vectors then, and a tile as wide as a column of the result file is written in one piece. With the starts 'up' and
-!> 'down' each point begins where its neighbour ended, and a chunk is some whole rows side by side. The list runs from the
-!> softest support to the stiffest; in which order its chunks are handed out is up to the forecast.
+!> processor's vectors then, and a tile as wide as a column of the result file is written in one piece. It may be halved, and
+!> its halves again, as long as the pieces fill the lanes. With the starts 'up' and 'down' each point begins where its neighbour
+!> ended, and a chunk is some whole rows side by side. The list runs from the softest support to the stiffest; in which order
+!> its chunks are handed out, and in what pieces, is up to the forecast.
 module spurflex_sweep_plan
    use spurflex_base_kinds, only: i8, wp
    use spurflex_base_text, only: fixed_text, to_text
@@ -14,37 +15,25 @@ module spurflex_sweep_plan
    use spurflex_measure_record, only: lines_of, observables, records
    use spurflex_measure_response, only: status_missing
    use spurflex_model_equations, only: rigid_dof, flexible_dof
+   use spurflex_sweep_chunk, only: chunk_type, halves_of, most_halvings
    implicit none
    private
 
-   public :: chunk_type, plan_row, plan_grid, points_of, is_chained, describe_plan
+   public :: plan_sweep, is_chained, describe_plan
 
-   !> Points handed out at once at most: few enough to balance, enough to write in one go.
-   integer, parameter :: largest_chunk = 256
+   !> A tile has so many rows and speeds; on a grid of fewer rows it is wider. As wide as a column of the result file it is written
+   !> in one piece a variable, a narrower one row by row; still wider or larger ones fill the lanes no better.
+   integer, parameter :: tile_rows = 8, tile_speeds = 32
 
-   !> Speeds of a chunk for each of its support stiffnesses, to a factor of two: a chunk as wide as a column of the result file is
-   !> written in one piece a variable, a narrower one row by row; still wider ones fill the lanes less well.
-   integer, parameter :: aspect = 4
+   !> Fewest points of a piece: the points that are solved side by side, twice. In half of that a point costs half as much again,
+   !> because no other takes the place of those that have come to their end.
+   integer, parameter :: smallest_piece = 16
 
-   !> Chunks that each rank should get at least, where there are enough points: a dear one takes as long as 20 others. With fewer
-   !> and larger ones the dearest take longer than all that a rank has to do, with more and smaller ones a point costs more.
-   integer, parameter :: chunks_per_rank = 64
+   !> Pieces that each rank should get even if they leave lanes empty.
+   integer, parameter :: fewest_pieces = 2
 
-   !> Points that a rank solves side by side: fewer in a chunk leave lanes empty.
-   integer, parameter :: smallest_chunk = 8
-
-   !> Chunks that each rank should get even if they leave lanes empty: one alone takes as long as the dearest.
-   integer, parameter :: fewest_chunks = 2
-
-   !> Neighbouring speeds of some neighbouring rows.
-   type :: chunk_type
-      !> Index of the first support stiffness, 0 for the rigid support, and number of them.
-      integer :: row = 0, rows = 1
-      !> Index of the first speed.
-      integer :: first = 1
-      !> Number of speeds.
-      integer :: count = 0
-   end type chunk_type
+   !> Most rows side by side with the starts 'up' and 'down': the points that are solved side by side.
+   integer, parameter :: most_chained = 8
 
 contains
 
@@ -58,92 +47,101 @@ contains
       chained = case%solver%start == start_up .or. case%solver%start == start_down
    end function is_chained
 
-   !> Chunks of the missing points of the rigid support.
-   pure function plan_row(case, status, ranks) result(chunks)
+   !> Chunks of the missing points, those of the rigid support first.
+   pure function plan_sweep(case, rigid_status, status, ranks) result(chunks)
       !> Case.
       type(case_type), intent(in) :: case
-      !> Status of each speed, shape (speed).
-      integer, intent(in) :: status(:)
-      !> Number of ranks.
-      integer, intent(in) :: ranks
-      !> The chunks, lowest speed first.
-      type(chunk_type), allocatable :: chunks(:)
-
-      chunks = cut_rows(case, reshape(status, [size(status), 1]), ranks)
-      chunks%row = 0
-   end function plan_row
-
-   !> Chunks of the missing points of the flexible support.
-   pure function plan_grid(case, status, ranks) result(chunks)
-      !> Case.
-      type(case_type), intent(in) :: case
-      !> Status of each point, shape (speed, stiffness).
+      !> Status of each speed on the rigid support, shape (speed).
+      integer, intent(in) :: rigid_status(:)
+      !> Status of each point on the flexible one, shape (speed, stiffness).
       integer, intent(in) :: status(:, :)
       !> Number of ranks.
       integer, intent(in) :: ranks
-      !> The chunks, softest support first.
+      !> The chunks, the lowest speed first, the softest support first.
       type(chunk_type), allocatable :: chunks(:)
 
-      chunks = cut_rows(case, status, ranks)
-   end function plan_grid
+      integer :: fewest
 
-   !> How many points chunks have.
-   pure function points_of(chunks) result(points)
-      !> The chunks.
-      type(chunk_type), intent(in) :: chunks(:)
-      !> Number of points.
-      integer :: points
-
-      points = sum(chunks%rows*chunks%count)
-   end function points_of
+      fewest = max(1, min(smallest_piece, (count(rigid_status == status_missing) + count(status == status_missing)) &
+                          /(ranks*fewest_pieces)))
+      chunks = cut_rows(case, reshape(rigid_status, [size(rigid_status), 1]), ranks, fewest)
+      chunks%row = 0
+      chunks = [chunks, cut_rows(case, status, ranks, fewest)]
+   end function plan_sweep
 
    !> Cut the missing points of some rows into chunks.
-   pure function cut_rows(case, status, ranks) result(chunks)
+   pure function cut_rows(case, status, ranks, fewest) result(chunks)
       !> Case.
       type(case_type), intent(in) :: case
       !> Status of each point, shape (speed, row).
       integer, intent(in) :: status(:, :)
       !> Number of ranks.
       integer, intent(in) :: ranks
+      !> Fewest points of a piece.
+      integer, intent(in) :: fewest
       !> The chunks.
       type(chunk_type), allocatable :: chunks(:)
 
       type(chunk_type), allocatable :: found(:)
-      integer :: missing, length, height, width, n, first, rows, row, speed
+      integer :: height, width, n, first, row, k
+      logical :: chained
 
-      missing = count(status == status_missing)
-      length = max(1, min(smallest_chunk, missing/(ranks*fewest_chunks)), min(largest_chunk, missing/(ranks*chunks_per_rank)))
-      ! A power of two: a tile begins with a column of the result file, or several fill it; where there are few rows it is wider.
-      width = 1
-      do while (2*width**2 <= aspect*length .and. 2*width <= length .and. width < size(status, 1))
-         width = 2*width
-      end do
-      width = max(1, min(width, size(status, 1)))
-      height = max(1, min(length/width, size(status, 2)))
-      if (height == size(status, 2)) width = max(1, min(length/height, size(status, 1)))
-      if (is_chained(case)) then
-         height = max(1, min(smallest_chunk, size(status, 2)/ranks))
+      chained = is_chained(case)
+      height = max(1, min(tile_rows, size(status, 2)))
+      width = tile_speeds
+      if (height == size(status, 2)) width = max(width, tile_rows*tile_speeds/height)
+      if (chained) then
+         height = max(1, min(most_chained, size(status, 2)/ranks))
          width = max(1, size(status, 1))
       end if
       allocate (found(size(status)))
       n = 0
-      do first = 1, size(status, 2), height
-         rows = min(height, size(status, 2) - first + 1)
-         do speed = 1, size(status, 1), width
-            associate (tile => status(speed:min(speed + width - 1, size(status, 1)), first:first + rows - 1))
-               if (all(tile == status_missing)) then
-                  n = n + 1
-                  found(n) = chunk_type(row=first, rows=rows, first=speed, count=size(tile, 1))
-               else
-                  do row = 1, rows
-                     call add_runs(tile(:, row), is_chained(case), chunk_type(row=first + row - 1, first=speed), found, n)
-                  end do
-               end if
-            end associate
+      do row = 1, size(status, 2), height
+         do first = 1, size(status, 1), width
+            call add_missing(status, chained, chunk_type(row=row, rows=min(height, size(status, 2) - row + 1), first=first, &
+                                                         count=min(width, size(status, 1) - first + 1)), found, n)
          end do
       end do
       chunks = found(:n)
+      if (chained) return
+      do k = 1, n
+         chunks(k)%halvings = most_halvings(chunks(k), fewest)
+      end do
    end function cut_rows
+
+   !> Add what is missing of a tile: as a whole, or in pieces of which everything is missing, which earlier runs may have left.
+   pure recursive subroutine add_missing(status, chained, tile, chunks, n)
+      !> Status of each point, shape (speed, row).
+      integer, intent(in) :: status(:, :)
+      !> Rows cannot be cut.
+      logical, intent(in) :: chained
+      !> The tile.
+      type(chunk_type), intent(in) :: tile
+      !> The chunks.
+      type(chunk_type), intent(inout) :: chunks(:)
+      !> How many there are.
+      integer, intent(inout) :: n
+
+      type(chunk_type) :: halves(2)
+      integer :: row, missing
+
+      associate (points => status(tile%first:tile%first + tile%count - 1, tile%row:tile%row + tile%rows - 1))
+         missing = count(points == status_missing)
+         if (missing == 0) return
+         if (missing == size(points)) then
+            n = n + 1
+            chunks(n) = tile
+         else if (chained .or. size(points) <= smallest_piece) then
+            do row = 1, tile%rows
+               call add_runs(points(:, row), chained, chunk_type(row=tile%row + row - 1, first=tile%first), chunks, n)
+            end do
+         else
+            halves = halves_of(tile)
+            call add_missing(status, chained, halves(1), chunks, n)
+            call add_missing(status, chained, halves(2), chunks, n)
+         end if
+      end associate
+   end subroutine add_missing
 
    !> Add what is missing of one row of a tile, run by run; a chained row as a whole.
    pure subroutine add_runs(status, as_a_whole, begin, chunks, n)

@@ -10,7 +10,7 @@ module spurflex_sweep_recording
    use spurflex_measure_recorder, only: recorder_type
    use spurflex_measure_response, only: response
    use spurflex_model_equations, only: equations_type
-   use spurflex_sweep_plan, only: chunk_type
+   use spurflex_sweep_chunk, only: chunk_type
    implicit none
    private
 

@@ -1,7 +1,7 @@
-!> One rank's time: how long it was busy with how many points, and whether it may begin another chunk before the run must end.
+!> One rank's time: how long it was busy with how many points, and whether it may begin another piece before the run must end.
 !>
-!> A run ends early when SIGUSR1 comes, when its stop file appears, or when the longest chunk seen on any rank would not be done
-!> within the wall-clock limit of the deck; the first chunk is begun whatever the limit, so that no run is in vain. It also ends
+!> A run ends early when SIGUSR1 comes, when its stop file appears, or when the longest piece seen on any rank would not be done
+!> within the wall-clock limit of the deck; the first piece is begun whatever the limit, so that no run is in vain. It also ends
 !> early when somebody takes its result file away.
 module spurflex_sweep_timekeeper
    use mpi_f08, only: MPI_Comm, MPI_DOUBLE_PRECISION, MPI_LOGICAL, MPI_LOR, mpi_allreduce, mpi_comm_rank, mpi_comm_size, mpi_gather
@@ -24,7 +24,7 @@ module spurflex_sweep_timekeeper
    character(len=*), parameter :: stop_ending = '.stop'
    !> Seconds between two looks at the stop file and the result file.
    real(wp), parameter :: look_interval = 0.25_wp
-   !> Time kept free of chunks before the limit: this many times the longest chunk, for the next may be longer ...
+   !> Time kept free of pieces before the limit: this many times the longest piece, for the next may be longer ...
    real(wp), parameter :: reserve_factor = 1.2_wp
    !> ... and the time to close the file and leave MPI [s].
    real(wp), parameter :: reserve_to_close = 1.0_wp
@@ -34,19 +34,19 @@ module spurflex_sweep_timekeeper
 
    !> One rank's time.
    type :: timekeeper
-      !> Why no further chunk may begin; empty as long as one may.
+      !> Why no further piece may begin; empty as long as one may.
       character(len=:), allocatable :: reason
       !> What stands at the path of the result file; rank 0 only.
       type(file_watch) :: file
       !> Points done.
       integer :: points = 0
-      !> Longest chunk of any rank, as far as is known here [s].
+      !> Longest piece of any rank, as far as is known here [s].
       real(wp) :: longest = 0.0_wp
-      !> The chunk that was done last [s].
+      !> The piece that was done last [s].
       real(wp) :: latest = 0.0_wp
-      !> Moment the chunk in hand began, negative without one; moment of the next look [s].
+      !> Moment the piece in hand began, negative without one; moment of the next look [s].
       real(wp), private :: begun = -1.0_wp, next_look = 0.0_wp
-      !> Time in chunks [s].
+      !> Time in pieces [s].
       real(wp), private :: busy = 0.0_wp
       !> Moment by which the run must have ended [s]; the limit of the deck [s], 0 for none.
       real(wp), private :: deadline = huge(1.0_wp), limit = 0.0_wp
@@ -54,11 +54,11 @@ module spurflex_sweep_timekeeper
       logical, private :: looks = .false.
       character(len=:), allocatable, private :: stop_path
    contains
-      !> A chunk begins.
-      procedure :: begin_chunk
-      !> The chunk in hand, if any, is done.
-      procedure :: end_chunk
-      !> No further chunk may begin.
+      !> A piece begins.
+      procedure :: begin_piece
+      !> The piece in hand, if any, is done.
+      procedure :: end_piece
+      !> No further piece may begin.
       procedure :: must_stop
       !> Every rank knows of a signal that came to any.
       procedure :: share_signal
@@ -97,16 +97,16 @@ contains
       path = case%output%file//stop_ending
    end function stop_file
 
-   !> A chunk begins.
-   subroutine begin_chunk(self)
+   !> A piece begins.
+   subroutine begin_piece(self)
       !> Keeper.
       class(timekeeper), intent(inout) :: self
 
       self%begun = steady_seconds()
-   end subroutine begin_chunk
+   end subroutine begin_piece
 
-   !> The chunk in hand, if any, is done.
-   subroutine end_chunk(self)
+   !> The piece in hand, if any, is done.
+   subroutine end_piece(self)
       !> Keeper.
       class(timekeeper), intent(inout) :: self
 
@@ -118,9 +118,9 @@ contains
       self%latest = seconds
       self%busy = self%busy + seconds
       self%longest = max(self%longest, seconds)
-   end subroutine end_chunk
+   end subroutine end_piece
 
-   !> No further chunk may begin, and `reason` tells why.
+   !> No further piece may begin, and `reason` tells why.
    function must_stop(self) result(stops)
       !> Keeper.
       class(timekeeper), intent(inout) :: self

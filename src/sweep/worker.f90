@@ -1,4 +1,4 @@
-!> One rank's work: take a chunk, solve its points, write it, take the next.
+!> One rank's work: take a piece of the grid, solve its points, write it, take the next.
 module spurflex_sweep_worker
    use mpi_f08, only: MPI_Comm, MPI_INTEGER8, MPI_DOUBLE_PRECISION, MPI_SUM, mpi_reduce
    use spurflex_base_error, only: error_type
@@ -7,35 +7,35 @@ module spurflex_sweep_worker
    use spurflex_io_axes, only: speeds, stiffnesses
    use spurflex_io_case, only: case_type
    use spurflex_io_log, only: logger
-   use spurflex_io_results, only: describe_damage, results_file, write_rigid, write_flexible
+   use spurflex_io_results, only: describe_damage, results_file
    use spurflex_measure_effort, only: effort_type, ways, stages, stage_write, kinds_of_steps
    use spurflex_measure_points, only: solver_type, new_solver, respond
    use spurflex_measure_record, only: records
    use spurflex_measure_recorder, only: recorder_type, new_recorder, release_recorder
-   use spurflex_measure_response, only: response, nan, status_diverged
+   use spurflex_measure_response, only: response, status_diverged
    use spurflex_model_equations, only: equations_type, new_equations, rest_deviation
    use spurflex_model_parameters, only: operating_point, support_rigid, support_flexible
    use spurflex_sweep_attendance, only: sweep_attendant
-   use spurflex_sweep_plan, only: chunk_type, is_chained
+   use spurflex_sweep_chunk, only: chunk_type, points_of
+   use spurflex_sweep_plan, only: is_chained
    use spurflex_sweep_recording, only: record_points
    use spurflex_sweep_schedule, only: new_scheduler
    use spurflex_sweep_timekeeper, only: timekeeper
+   use spurflex_sweep_twins, only: twin_table
+   use spurflex_sweep_writing, only: finding, outbox, write_finding
    implicit none
    private
 
-   public :: work_on_chunks, set_points, no_twin
-
-   !> Larger than every deformation: a rigid twin that is not known, or not on this rank.
-   real(wp), parameter :: no_twin = huge(1.0_wp)
+   public :: work_on_chunks, set_points
 
 contains
 
-   !> Solve the points of chunks as long as there are any. All ranks call this together.
-   subroutine work_on_chunks(case, chunks, comm, results, log, keeper, rigid_deformation, total, effort, error)
+   !> Solve the points of chunks, piece by piece, as long as there are any. All ranks call this together.
+   subroutine work_on_chunks(case, chunks, comm, results, log, keeper, twins, total, effort, error)
       !> Case.
       type(case_type), intent(in) :: case
       !> Chunks, the same on every rank.
-      type(chunk_type), intent(in) :: chunks(:)
+      type(chunk_type), intent(in), target :: chunks(:)
       !> The ranks.
       type(MPI_Comm), intent(in) :: comm
       !> Open result file.
@@ -44,9 +44,8 @@ contains
       type(logger), intent(inout), target :: log
       !> This rank's time.
       type(timekeeper), intent(inout), target :: keeper
-      !> Largest bearing deformations of the rigid twins and their relative error, shape (3, speed): filled in where this rank
-      !> solves rigid points; unallocated if they are not asked for.
-      real(wp), allocatable, intent(inout) :: rigid_deformation(:, :)
+      !> Rigid twins.
+      type(twin_table), intent(inout), asynchronous :: twins
       !> On rank 0: points by status on all ranks, shape (outcomes).
       integer, intent(out) :: total(:)
       !> On rank 0: what the points cost on all ranks.
@@ -58,14 +57,12 @@ contains
       type(solver_type), allocatable :: solver
       type(solver_options) :: options
       type(recorder_type), allocatable :: recorder
-      type(response), allocatable :: responses(:)
-      integer(i4), allocatable :: checksums(:)
-      character(len=:), allocatable :: damage
-      integer :: number, i
+      type(finding) :: found
+      type(outbox) :: unwritten
       logical :: available
 
       visitor%log => log
-      visitor%points = sum(int(chunks%rows, i8)*chunks%count)
+      visitor%points = sum(int(points_of(chunks), i8))
       call new_scheduler(visitor%schedule, comm, chunks, keeper)
       options = case%solver
       options%multipliers = any(case%output%products == 'floquet' .or. case%output%products == 'lyapunov')
@@ -73,26 +70,41 @@ contains
       call new_solver(options, solver)
       allocate (recorder)
       call new_recorder(options, case%output%record, recorder)
-      if (size(chunks) > 0) then
-         damage = describe_damage(results, rigid=chunks(1)%row == 0)
-         if (damage /= '') call log%say(damage)
-      end if
+      call say_damage(chunks, results, log)
       do
-         call visitor%schedule%take(number, available)
+         call visitor%schedule%take(found%chunk, available)
          if (.not. available) exit
-         allocate (responses(chunks(number)%rows*chunks(number)%count))
-         allocate (checksums(size(responses)), source=0_i4)
-         call solve_chunk(case, chunks(number), solver, recorder, results, visitor, responses, checksums, error)
+         associate (points => points_of(found%chunk))
+            allocate (found%responses(points))
+            allocate (found%checksums(points), source=0_i4)
+         end associate
+         ! Rigid points come first: after a flexible one there are no more.
+         if (found%chunk%row > 0) call twins%share(comm)
+         call solve_chunk(case, found%chunk, solver, recorder, results, visitor, found%responses, found%checksums, error)
          if (allocated(error)) return
          call solver%effort%begin()
-         call write_chunk(chunks(number), responses, checksums, results, rigid_deformation, error)
+         if (found%chunk%row == 0) then
+            call twins%keep(found%chunk%first, found%responses)
+            call write_finding(found, twins, results, visitor%schedule, error)
+            deallocate (found%responses, found%checksums)
+         else
+            call unwritten%put(found)
+            ! What it takes to write what has waited is not what this piece takes.
+            if (unwritten%has_older()) call keeper%end_piece()
+            if (twins%are_known()) call unwritten%empty(twins, results, visitor%schedule, error)
+         end if
          if (allocated(error)) return
          call solver%effort%end(stage_write)
-         do i = 1, size(responses)
-            call visitor%schedule%count_point(responses(i)%status)
-         end do
-         deallocate (responses, checksums)
       end do
+      ! Other ranks may be at work yet, and ask rank 0 for more.
+      call twins%share(comm)
+      do while (.not. twins%are_known())
+         call visitor%attend()
+      end do
+      call solver%effort%begin()
+      call unwritten%empty(twins, results, visitor%schedule, error)
+      if (allocated(error)) return
+      call solver%effort%end(stage_write)
       call release_recorder(recorder)
       call visitor%schedule%finish()
       total = visitor%schedule%total
@@ -102,6 +114,27 @@ contains
       call mpi_reduce(solver%effort%modes, effort%modes, kinds_of_steps, MPI_INTEGER8, MPI_SUM, 0, comm)
       call mpi_reduce(solver%effort%seconds, effort%seconds, stages, MPI_DOUBLE_PRECISION, MPI_SUM, 0, comm)
    end subroutine work_on_chunks
+
+   !> Say what of the file is computed again.
+   subroutine say_damage(chunks, results, log)
+      !> The chunks.
+      type(chunk_type), intent(in) :: chunks(:)
+      !> Open result file.
+      type(results_file), intent(in) :: results
+      !> Logger.
+      type(logger), intent(in) :: log
+
+      character(len=:), allocatable :: damage
+      logical :: rigid
+      integer :: k
+
+      do k = 1, 2
+         rigid = k == 1
+         if (.not. any((chunks%row == 0) .eqv. rigid)) cycle
+         damage = describe_damage(results, rigid)
+         if (damage /= '') call log%say(trim(merge('rigid:    ', 'flexible: ', rigid))//' '//damage)
+      end do
+   end subroutine say_damage
 
    !> Solve the points of a chunk; record what is asked for of them, and write that.
    subroutine solve_chunk(case, chunk, solver, recorder, results, visitor, responses, checksums, error)
@@ -229,45 +262,5 @@ contains
       velocity = 0.0_wp
       if (case%solver%start == start_rest) position = rest_deviation(equations)
    end subroutine set_start
-
-   !> Write a complete chunk; keep rigid twins, compare with them.
-   subroutine write_chunk(chunk, responses, checksums, results, rigid_deformation, error)
-      !> The chunk.
-      type(chunk_type), intent(in) :: chunk
-      !> Its responses, shape (count rows).
-      type(response), intent(in) :: responses(:)
-      !> Checksums of what was recorded, shape (count rows).
-      integer(i4), intent(in) :: checksums(:)
-      !> Open result file.
-      type(results_file), intent(in) :: results
-      !> Rigid twins, shape (3, speed); unallocated if they are not asked for.
-      real(wp), allocatable, intent(inout) :: rigid_deformation(:, :)
-      !> Set where the chunk cannot be written.
-      type(error_type), allocatable, intent(out) :: error
-
-      real(wp) :: eta(3, size(responses)), rigid(2), ratio(2)
-      integer :: i, twin
-
-      eta = nan()
-      if (chunk%row == 0) then
-         do i = 1, size(responses)
-            if (responses(i)%status == status_diverged) cycle
-            rigid_deformation(:, chunk%first + i - 1) = [responses(i)%bearing_deformation_max, responses(i)%error_estimate]
-         end do
-         call write_rigid(results, chunk%first, responses, error, checksums)
-         return
-      end if
-      if (allocated(rigid_deformation)) then
-         do i = 1, size(responses)
-            twin = chunk%first + mod(i - 1, chunk%count)
-            rigid = rigid_deformation(:2, twin)
-            if (any(rigid >= no_twin) .or. any(rigid <= 0.0_wp) .or. responses(i)%status == status_diverged) cycle
-            ratio = responses(i)%bearing_deformation_max/rigid
-            eta(:2, i) = 100.0_wp*(ratio - 1.0_wp)
-            eta(3, i) = 100.0_wp*maxval(ratio)*(responses(i)%error_estimate + rigid_deformation(3, twin))
-         end do
-      end if
-      call write_flexible(results, chunk%row, chunk%rows, chunk%first, responses, eta, error, checksums)
-   end subroutine write_chunk
 
 end module spurflex_sweep_worker

@@ -25,7 +25,8 @@ program bare_sweep
    use spurflex_model_equations, only: equations_type
    use spurflex_sweep_attendance, only: outcome_text, sweep_attendant
    use spurflex_sweep_driver, only: share_case
-   use spurflex_sweep_plan, only: chunk_type, is_chained, plan_grid, plan_row, points_of
+   use spurflex_sweep_chunk, only: chunk_type, points_of
+   use spurflex_sweep_plan, only: is_chained, plan_sweep
    use spurflex_sweep_schedule, only: new_scheduler, outcomes
    use spurflex_sweep_timekeeper, only: timekeeper
    use spurflex_sweep_worker, only: set_points
@@ -54,9 +55,10 @@ program bare_sweep
    total = 0
    allocate (known(case%sweep%speed_count, 0:case%sweep%stiffness_count))
    known%status = status_missing
-   if (case%sweep%rigid) call solve(plan_row(case, spread(status_missing, 1, case%sweep%speed_count), ranks))
-   if (case%sweep%flexible) call solve(plan_grid(case, spread(spread(status_missing, 1, case%sweep%speed_count), 2, &
-                                                              case%sweep%stiffness_count), ranks))
+   associate (speeds => case%sweep%speed_count, rows => case%sweep%stiffness_count)
+      call solve(plan_sweep(case, spread(status_missing, 1, merge(speeds, 0, case%sweep%rigid)), &
+                            spread(spread(status_missing, 1, speeds), 2, merge(rows, 0, case%sweep%flexible)), ranks))
+   end associate
    begun = log%elapsed()
    call keep()
    call log%say('result file: written in '//fixed_text(log%elapsed() - begun, 3)//' s')
@@ -74,10 +76,10 @@ contains
       call MPI_Abort(MPI_COMM_WORLD, 1)
    end subroutine give_up
 
-   !> Solve the points of chunks; counts up `total` on rank 0.
+   !> Solve the points of chunks; `total` of all ranks on rank 0.
    subroutine solve(chunks)
       !> The chunks.
-      type(chunk_type), intent(in) :: chunks(:)
+      type(chunk_type), intent(in), target :: chunks(:)
 
       type(sweep_attendant) :: visitor
       type(solver_type), allocatable :: solver
@@ -85,11 +87,12 @@ contains
       type(equations_type), allocatable :: equations(:)
       type(response), allocatable :: responses(:)
       real(wp), allocatable :: positions(:, :), velocities(:, :)
-      integer :: number, i
+      type(chunk_type) :: chunk
+      integer :: i
       logical :: available
 
       visitor%log => log
-      visitor%points = int(points_of(chunks), i8)
+      visitor%points = sum(int(points_of(chunks), i8))
       call log%begin('a sweep that guards nothing')
       call new_scheduler(visitor%schedule, MPI_COMM_WORLD, chunks, keeper)
       options = case%solver
@@ -97,26 +100,20 @@ contains
       allocate (solver)
       call new_solver(options, solver)
       do
-         call visitor%schedule%take(number, available)
+         call visitor%schedule%take(chunk, available)
          if (.not. available) exit
-         associate (chunk => chunks(number))
-            allocate (responses(chunk%rows*chunk%count))
-            call set_points(case, chunk, 1, chunk%count, equations, positions, velocities)
-         end associate
+         allocate (responses(points_of(chunk)))
+         call set_points(case, chunk, 1, chunk%count, equations, positions, velocities)
          call respond(solver, equations, positions, velocities, visitor, responses)
          do i = 1, size(responses)
             call visitor%schedule%count_point(responses(i)%status)
          end do
-         associate (chunk => chunks(number))
-            known(chunk%first:chunk%first + chunk%count - 1, chunk%row:chunk%row + chunk%rows - 1) = &
-               reshape(responses, [chunk%count, chunk%rows])
-         end associate
+         known(chunk%first:chunk%first + chunk%count - 1, chunk%row:chunk%row + chunk%rows - 1) = &
+            reshape(responses, [chunk%count, chunk%rows])
          deallocate (responses)
       end do
       call visitor%schedule%finish()
-      total = total + visitor%schedule%total
-      ! Requests of what follows may not reach this scheduler.
-      call MPI_Barrier(MPI_COMM_WORLD)
+      total = visitor%schedule%total
    end subroutine solve
 
    !> Collect all responses on rank 0 and write them.

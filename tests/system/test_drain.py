@@ -150,6 +150,26 @@ def test_signal(root, run, program, mpiexec, whole, tmp_path):
     go_on(run, deck, folder, whole)
 
 
+@pytest.mark.parametrize("start", ["static", "up"])
+def test_signal_to_one_rank(root, run, program, mpiexec, tmp_path, start):
+    """The others hear of it, also while one of them has the whole rigid row; the file is as if nothing was."""
+    needs_open_mpi(mpiexec)
+    grid = {"rows": 48, "speeds": 120, "start": start}
+    undisturbed = map_deck(root, tmp_path / "whole", **grid)
+    assert run(undisturbed, ranks=2, folder=undisturbed.parent, environment=EPOCH).returncode == EXIT_COMPLETE
+    folder = tmp_path / "drained"
+    deck = map_deck(root, folder, **grid)
+    with Job(program, mpiexec, deck, ranks=3, folder=folder) as job:
+        assert job.wait_until(lambda: "points on 3 ranks" in job.output, "no sweep")
+        os.kill(job.ranks()[2], signal.SIGUSR1)
+        asked = time.monotonic()
+        code = job.wait()
+    assert code == EXIT_STOPPED, job.output
+    assert time.monotonic() - asked < 10.0
+    assert "run the same command again to go on" in job.output
+    go_on(run, deck, folder, undisturbed.parent / "map.h5")
+
+
 SCONTROL = """#!/bin/sh
 echo "$@" >> "{log}"
 """

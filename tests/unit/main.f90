@@ -3,6 +3,8 @@
 program unit_tests
    use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
    use mpi_f08, only: MPI_Allreduce, MPI_COMM_WORLD, MPI_Finalize, MPI_Init, MPI_INTEGER, MPI_SUM
+   use test_twins, only: collect_twins
+   use test_chunk, only: collect_chunk
    use test_batch, only: collect_batch
    use test_collocation, only: collect_collocation
    use test_contact, only: collect_contact
@@ -53,8 +55,10 @@ program unit_tests
             new_testsuite('dense', collect_dense), &
             new_testsuite('spectrum', collect_spectrum), &
             new_testsuite('recorder', collect_recorder), &
+            new_testsuite('chunk', collect_chunk), &
             new_testsuite('plan', collect_plan), &
             new_testsuite('forecast', collect_forecast), &
+            new_testsuite('twins', collect_twins), &
             new_testsuite('steady', collect_steady), &
             new_testsuite('modal', collect_modal), &
             new_testsuite('truncation', collect_truncation), &

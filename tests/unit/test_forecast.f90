@@ -1,4 +1,4 @@
-!> In which order chunks are handed out, and how long the rest is said to take.
+!> In which order and in what pieces chunks are handed out, and how long the rest is said to take.
 module test_forecast
    use pseudo_random, only: random_stream
    use spurflex_base_kinds, only: i8, wp
@@ -6,8 +6,9 @@ module test_forecast
    use spurflex_integrate_options, only: start_static, start_up
    use spurflex_io_case, only: case_type
    use spurflex_measure_response, only: status_missing, status_settled
+   use spurflex_sweep_chunk, only: chunk_type, most_halvings, part_of, piece_type, points_of
    use spurflex_sweep_forecast, only: forecast_type, new_forecast
-   use spurflex_sweep_plan, only: chunk_type, plan_grid, plan_row
+   use spurflex_sweep_plan, only: plan_sweep
    use test_support, only: check, error_type, new_unittest, unittest_type
    implicit none
    private
@@ -22,11 +23,14 @@ contains
       type(unittest_type), allocatable, intent(out) :: testsuite(:)
 
       testsuite = [ &
-                  new_unittest('every chunk is handed out once', test_permutation), &
+                  new_unittest('every point is handed out once', test_permutation), &
                   new_unittest('the pilot is spread evenly', test_pilot), &
                   new_unittest('dearest first', test_dearest), &
-                  new_unittest('large chunks first where points cost the same', test_large), &
                   new_unittest('what comes back late changes the order', test_late), &
+                  new_unittest('one rank gets whole chunks', test_whole), &
+                  new_unittest('no piece is longer than one should wait', test_longest), &
+                  new_unittest('dear chunks are cut, and all when little is left', test_cut), &
+                  new_unittest('the rigid support goes ahead', test_ahead), &
                   new_unittest('no chunk and one chunk', test_few), &
                   new_unittest('equal times and no times keep the order of the list', test_equal), &
                   new_unittest('one row', test_row), &
@@ -64,15 +68,17 @@ contains
       !> The chunks as they were taken; 0 where none was left.
       integer, intent(out) :: order(:)
 
+      type(piece_type) :: pieces(size(order))
       integer :: k
 
       do k = 1, size(order)
-         call forecast%next(order(k))
-         if (k > delay) call forecast%note(order(k - delay), seconds(order(k - delay)))
+         call forecast%next(pieces(k))
+         order(k) = pieces(k)%chunk
+         if (k > delay) call forecast%note(pieces(k - delay), seconds(order(k - delay)))
       end do
    end subroutine take_all
 
-   !> Any grid, any missing points, chained or not; times in any order.
+   !> Any grid, any missing points, chained or not, any number of ranks; times in any order.
    subroutine test_permutation(error)
       !> Why the test failed.
       type(error_type), allocatable, intent(out) :: error
@@ -81,9 +87,11 @@ contains
       type(random_stream) :: random
       type(forecast_type) :: forecast
       type(chunk_type), allocatable :: chunks(:)
-      integer, allocatable :: status(:, :), order(:), times(:)
-      real(wp), allocatable :: seconds(:)
-      integer :: i, k, speeds, rows, share, ranks, delay, dice, chunk
+      type(piece_type), allocatable :: pieces(:)
+      type(chunk_type) :: part
+      integer, allocatable :: status(:, :), times(:, :)
+      integer :: i, k, speeds, rows, share, ranks, delay, dice, handed_out
+      real(wp) :: seconds
       character(len=:), allocatable :: what
 
       random = random_stream(61_i8)
@@ -94,35 +102,175 @@ contains
          call random%pick(1, 10, share)
          call random%pick(1, 30, ranks)
          call random%pick(0, 2*ranks, delay)
-         allocate (status(speeds, rows), source=status_settled)
-         do k = 1, size(status)
+         ! Row 0 is the rigid support.
+         allocate (status(speeds, 0:rows), times(speeds, 0:rows))
+         status = status_settled
+         do k = 0, size(status) - 1
             call random%pick(1, 10, dice)
-            if (dice <= share) status(1 + mod(k - 1, speeds), 1 + (k - 1)/speeds) = status_missing
+            if (dice <= share) status(1 + mod(k, speeds), k/speeds) = status_missing
          end do
          if (mod(i, 3) == 0) status = status_missing
-         chunks = plan_grid(case, status, ranks)
-         allocate (order(size(chunks)), seconds(size(chunks)), times(size(chunks)))
-         call random%fill(0.0_wp, 1.0_wp, seconds)
-         if (mod(i, 7) == 0) seconds = 0.0_wp
-         forecast = new_forecast(chunks)
-         call take_all(forecast, seconds, delay, order)
-         what = to_text(speeds)//' speeds, '//to_text(rows)//' rows, '//to_text(size(chunks))//' chunks'
-         call check(error, all(order >= 1 .and. order <= size(chunks)), what)
-         if (allocated(error)) return
+         chunks = plan_sweep(case, status(:, 0), status(:, 1:), ranks)
+         forecast = new_forecast(chunks, ranks)
+         allocate (pieces(sum(points_of(chunks)) + 1))
          times = 0
-         do k = 1, size(order)
-            times(order(k)) = times(order(k)) + 1
+         what = to_text(speeds)//' speeds, '//to_text(rows)//' rows, '//to_text(size(chunks))//' chunks'
+         do handed_out = 1, size(pieces)
+            call forecast%next(pieces(handed_out))
+            if (pieces(handed_out)%chunk == 0) exit
+            part = part_of(chunks(pieces(handed_out)%chunk), pieces(handed_out))
+            associate (own => times(part%first:part%first + part%count - 1, part%row:part%row + part%rows - 1))
+               own = own + 1
+            end associate
+            call random%uniform(0.0_wp, 1.0_wp, seconds)
+            if (mod(i, 7) == 0) seconds = 0.0_wp
+            if (handed_out > delay) call forecast%note(pieces(handed_out - delay), seconds)
          end do
-         call check(error, all(times == 1), what)
+         call check(error, forecast%is_exhausted(), what)
          if (allocated(error)) return
-         call check(error, forecast%is_exhausted(), 'exhausted')
+         ! A chained row with a missing point is solved as a whole.
+         if (case%solver%start == start_up) then
+            do k = 0, rows
+               if (any(status(:, k) == status_missing)) status(:, k) = status_missing
+            end do
+         end if
+         call check(error, all(times == merge(1, 0, status == status_missing)), what)
          if (allocated(error)) return
-         call forecast%next(chunk)
-         call check(error, chunk, 0, 'none is left')
-         if (allocated(error)) return
-         deallocate (status, order, seconds, times)
+         deallocate (status, times, pieces)
       end do
    end subroutine test_permutation
+
+   !> With one rank there is nobody to wait for; only the first chunk tells, in small pieces, how long points take.
+   subroutine test_whole(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer, parameter :: columns = 12, rows = 5
+      type(forecast_type) :: forecast
+      type(chunk_type) :: chunks(columns*rows)
+      type(piece_type) :: piece
+      integer :: k, whole
+
+      chunks = tiles(columns, rows, 32, 8)
+      chunks%halvings = most_halvings(chunks(1), 16)
+      forecast = new_forecast(chunks, 1)
+      whole = 0
+      do k = 1, 100*size(chunks)
+         if (forecast%is_exhausted()) exit
+         call forecast%next(piece)
+         if (k == 1) call check(error, piece%halvings, chunks(1)%halvings, 'the first')
+         if (allocated(error)) return
+         if (piece%halvings == 0) whole = whole + 1
+         call forecast%note(piece, 1.0e-3_wp*k)
+      end do
+      call check(error, forecast%is_exhausted())
+      if (allocated(error)) return
+      call check(error, whole, size(chunks) - 1)
+   end subroutine test_whole
+
+   !> Points that take seconds: even one rank gets no piece that takes much longer than it must.
+   subroutine test_longest(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer, parameter :: columns = 20, rows = 6, smallest = 16
+      real(wp), parameter :: each = 0.2_wp, longest = 5.0_wp
+      type(forecast_type) :: forecast
+      type(chunk_type) :: chunks(columns*rows)
+      type(piece_type) :: piece
+      integer :: k, points
+
+      chunks = tiles(columns, rows, 32, 8)
+      chunks%halvings = most_halvings(chunks(1), smallest)
+      forecast = new_forecast(chunks, 1)
+      do k = 1, 10*size(chunks)
+         call forecast%next(piece)
+         points = points_of(part_of(chunks(piece%chunk), piece))
+         call check(error, points*each <= longest, to_text(points)//' points')
+         if (allocated(error)) return
+         call forecast%note(piece, points*each)
+      end do
+   end subroutine test_longest
+
+   !> A few dear tiles among cheap ones: once it is known which they are none of their pieces takes more than an eighth of the time,
+   !> most of the cheap ones stay whole, and what is handed out last is small. The ranks then end at about the same time.
+   subroutine test_cut(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer, parameter :: columns = 40, rows = 20, ranks = 16, smallest = 16
+      real(wp), parameter :: cheap = 1.0e-6_wp, dear = 200.0_wp*cheap
+      type(forecast_type) :: forecast
+      type(chunk_type) :: chunks(columns*rows)
+      type(piece_type) :: piece, pieces(ranks)
+      real(wp) :: each(columns*rows), free(ranks), fair, longest
+      integer :: k, r, points, whole
+
+      chunks = tiles(columns, rows, 32, 8)
+      chunks%halvings = most_halvings(chunks(1), smallest)
+      each = cheap
+      do k = 1, size(each)
+         if (abs(mod(k - 1, columns) - 20) < 2) each(k) = dear
+      end do
+      forecast = new_forecast(chunks, ranks)
+      free = 0.0_wp
+      longest = 0.0_wp
+      whole = 0
+      fair = sum(each*points_of(chunks))/ranks
+      do
+         r = minloc(free, 1)
+         if (pieces(r)%chunk > 0) call forecast%note(pieces(r), each(pieces(r)%chunk) &
+                                                     *points_of(part_of(chunks(pieces(r)%chunk), pieces(r))))
+         call forecast%next(piece)
+         if (piece%chunk == 0) exit
+         pieces(r) = piece
+         points = points_of(part_of(chunks(piece%chunk), piece))
+         if (piece%halvings == 0) whole = whole + 1
+         if (free(r) > fair/3.0_wp) longest = max(longest, each(piece%chunk)*points)
+         free(r) = free(r) + each(piece%chunk)*points
+      end do
+      call check(error, points, smallest, 'the last one')
+      if (allocated(error)) return
+      call check(error, whole > size(chunks)/2, to_text(whole)//' stay whole')
+      if (allocated(error)) return
+      call check(error, longest < fair/8.0_wp, 'longest '//to_text(longest)//' of '//to_text(fair))
+      if (allocated(error)) return
+      call check(error, maxval(free) < 1.02_wp*fair, 'the last rank ends at '//to_text(maxval(free)))
+   end subroutine test_cut
+
+   !> All rigid chunks come first, in the order of the list; their times say nothing about the others.
+   subroutine test_ahead(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer, parameter :: columns = 16, rows = 8, rigid = 3
+      type(forecast_type) :: forecast
+      type(chunk_type) :: chunks(rigid + columns*rows)
+      type(piece_type) :: piece
+      integer :: k, previous
+
+      chunks(:rigid) = tiles(rigid, 1, 256, 1)
+      chunks(:rigid)%row = 0
+      chunks(:rigid)%halvings = most_halvings(chunks(1), 16)
+      chunks(rigid + 1:) = tiles(columns, rows, 32, 8)
+      forecast = new_forecast(chunks, 8)
+      previous = 0
+      do k = 1, 1000
+         call forecast%next(piece)
+         if (piece%chunk > rigid) exit
+         call check(error, piece%chunk >= previous, 'in order')
+         if (allocated(error)) return
+         previous = piece%chunk
+         call forecast%note(piece, 100.0_wp)
+      end do
+      call check(error, previous == rigid .and. k > 1, 'all of them')
+      if (allocated(error)) return
+      call check(error, forecast%remaining(1.0_wp) < 0.0_wp, 'nothing is known of the others')
+      if (allocated(error)) return
+      call forecast%note(piece, 2.0_wp)
+      call check(error, abs(forecast%remaining(100.0_wp*(k - 1)/8 + 2.0_wp/8) - (columns*rows - 1)*2.0_wp/8) < 1.0e-9_wp, &
+                 to_text(forecast%remaining(100.0_wp*(k - 1)/8 + 2.0_wp/8)))
+   end subroutine test_ahead
 
    !> Of any eight neighbours in a row or in a column one is in the pilot, and no two of the pilot touch.
    subroutine test_pilot(error)
@@ -132,16 +280,17 @@ contains
       integer, parameter :: columns = 40, rows = 24, share = 8
       type(forecast_type) :: forecast
       logical :: in_pilot(columns, rows)
-      integer :: chunk, k, i, j
+      type(piece_type) :: piece
+      integer :: k, i, j
 
-      forecast = new_forecast(tiles(columns, rows, 16, 16))
+      forecast = new_forecast(tiles(columns, rows, 16, 16), 1)
       in_pilot = .false.
       do k = 1, columns*rows/share
-         call forecast%next(chunk)
-         if (k == 1) call check(error, chunk, 1, 'the first of the list')
+         call forecast%next(piece)
+         if (k == 1) call check(error, piece%chunk, 1, 'the first of the list')
          if (allocated(error)) return
-         in_pilot(1 + mod(chunk - 1, columns), 1 + (chunk - 1)/columns) = .true.
-         call forecast%note(chunk, 1.0_wp)
+         in_pilot(1 + mod(piece%chunk - 1, columns), 1 + (piece%chunk - 1)/columns) = .true.
+         call forecast%note(piece, 1.0_wp)
       end do
       do j = 1, rows
          do i = 1, columns
@@ -170,7 +319,7 @@ contains
          seconds(k) = 1.0_wp + 4.0_wp*abs(i - 15)/columns
          if (abs(i - 30) < 3) seconds(k) = 100.0_wp
       end do
-      forecast = new_forecast(tiles(columns, rows, 8, 8))
+      forecast = new_forecast(tiles(columns, rows, 8, 8), 1)
       call take_all(forecast, seconds, 0, order)
       associate (rest => seconds(order(pilot + 1:)))
          dear = count(rest > 50.0_wp)
@@ -184,26 +333,6 @@ contains
          call check(error, all(mean(2:) < mean(:quarters - 1)), 'costs fall')
       end associate
    end subroutine test_dearest
-
-   !> Points that cost the same in tiles of several sizes.
-   subroutine test_large(error)
-      !> Why the test failed.
-      type(error_type), allocatable, intent(out) :: error
-
-      integer, parameter :: columns = 16, rows = 8, pilot = columns*rows/8
-      type(forecast_type) :: forecast
-      type(chunk_type) :: chunks(columns*rows)
-      integer :: order(columns*rows), k
-
-      chunks = tiles(columns, rows, 8, 1)
-      chunks%count = 1 + modulo([(3*k, k=1, size(chunks))], 8)
-      chunks(1)%count = 8
-      forecast = new_forecast(chunks)
-      call take_all(forecast, 0.01_wp*chunks%count, 0, order)
-      associate (points => chunks(order(pilot + 1:))%count)
-         call check(error, all(points(2:) <= points(:size(points) - 1)))
-      end associate
-   end subroutine test_large
 
    !> The pilot has seen nothing of a dear region; as soon as two of it are known, the rest of it comes next.
    subroutine test_late(error)
@@ -219,7 +348,7 @@ contains
       seconds = 1.0_wp
       seconds(34:37) = 50.0_wp
       seconds(columns + 34:columns + 37) = 50.0_wp
-      forecast = new_forecast(tiles(columns, rows, 4, 4))
+      forecast = new_forecast(tiles(columns, rows, 4, 4), 1)
       call take_all(forecast, seconds, 0, order)
       last = maxval(pack([(k, k=1, size(order))], seconds(order) > 1.0_wp))
       call check(error, last < size(order)*3/4, 'the last dear one was number '//to_text(last)//' of '//to_text(size(order)) &
@@ -233,28 +362,24 @@ contains
 
       type(forecast_type) :: forecast
       type(chunk_type) :: none(0)
-      integer :: chunk
+      type(piece_type) :: piece
 
-      forecast = new_forecast(none)
+      forecast = new_forecast(none, 1)
       call check(error, forecast%is_exhausted(), 'no chunk')
       if (allocated(error)) return
-      call forecast%next(chunk)
-      call check(error, chunk, 0)
+      call forecast%next(piece)
+      call check(error, piece%chunk, 0)
       if (allocated(error)) return
-      forecast = new_forecast([chunk_type(row=0, rows=1, first=7, count=3)])
-      call forecast%next(chunk)
-      call check(error, chunk, 1)
+      forecast = new_forecast([chunk_type(row=0, rows=1, first=7, count=3)], 4)
+      call forecast%next(piece)
+      call check(error, piece%chunk, 1)
       if (allocated(error)) return
       call check(error, forecast%is_exhausted(), 'one chunk')
       if (allocated(error)) return
-      call check(error, forecast%remaining(4, 1.0_wp) < 0.0_wp, 'nothing is known')
+      call check(error, forecast%remaining(1.0_wp) < 0.0_wp, 'nothing is known')
       if (allocated(error)) return
-      call forecast%note(1, 2.0_wp)
-      call check(error, abs(forecast%remaining(4, 1.0_wp)) <= 0.0_wp, 'nothing is left')
-      if (allocated(error)) return
-      ! Told twice, counted once.
-      call forecast%note(1, 2.0_wp)
-      call check(error, abs(forecast%remaining(4, 1.0_wp)) <= 0.0_wp, 'still nothing')
+      call forecast%note(piece, 2.0_wp)
+      call check(error, abs(forecast%remaining(1.0_wp)) <= 0.0_wp, 'nothing is left')
    end subroutine test_few
 
    !> Where nothing is dearer, or nothing took any time, what follows the pilot is in the order of the list.
@@ -270,37 +395,40 @@ contains
       do kind = 0, 1
          seconds = real(kind, wp)
          do delay = 0, 300, 100
-            forecast = new_forecast(tiles(columns, rows, 5, 3))
+            forecast = new_forecast(tiles(columns, rows, 5, 3), 1)
             call take_all(forecast, seconds, delay, order)
             falls = count([(order(k) < order(k - 1), k=2, size(order))])
             call check(error, falls, 1, 'times of '//to_text(kind)//' s, told '//to_text(delay)//' chunks later')
             if (allocated(error)) return
          end do
       end do
-      if (forecast%remaining(2, 1.0_wp) > 0.0_wp) call check(error, .false., 'nothing is known and remains')
+      if (forecast%remaining(1.0_wp) > 0.0_wp) call check(error, .false., 'nothing is known and remains')
    end subroutine test_equal
 
-   !> The rigid support is one row: every eighth chunk is the pilot.
+   !> A long row: every eighth chunk is the pilot.
    subroutine test_row(error)
       !> Why the test failed.
       type(error_type), allocatable, intent(out) :: error
 
+      integer, parameter :: speeds = 30000, tile = 256
       type(case_type) :: case
       type(forecast_type) :: forecast
       type(chunk_type), allocatable :: chunks(:)
-      integer, allocatable :: order(:)
+      integer, allocatable :: order(:), status(:)
       real(wp), allocatable :: seconds(:)
-      integer :: status(571), k, pilot
+      integer :: none(0, 0), k, pilot
 
       case%solver%start = start_static
-      status = status_missing
-      chunks = plan_row(case, status, 4)
+      allocate (status(speeds), source=status_missing)
+      chunks = plan_sweep(case, status, none, 4)
+      call check(error, size(chunks), ceiling(real(speeds, wp)/tile))
+      if (allocated(error)) return
       allocate (seconds(size(chunks)), source=1.0_wp)
       allocate (order(size(chunks)))
       pilot = (size(chunks) + 7)/8
       ! The dear ones are in the middle.
       seconds(size(chunks)/2:size(chunks)/2 + 16) = 30.0_wp
-      forecast = new_forecast(chunks)
+      forecast = new_forecast(chunks, 1)
       call take_all(forecast, seconds, 0, order)
       call check(error, all(order(:pilot) == [(k, k=1, size(chunks), 8)]), 'pilot')
       if (allocated(error)) return
@@ -317,18 +445,18 @@ contains
       type(forecast_type) :: forecast
       type(chunk_type), allocatable :: chunks(:)
       real(wp) :: seconds(rows)
-      integer :: status(30, rows), order(rows)
+      integer :: none(0), status(30, rows), order(rows)
 
       case%solver%start = start_up
       status = status_missing
-      chunks = plan_grid(case, status, rows)
+      chunks = plan_sweep(case, none, status, rows)
       call check(error, size(chunks), rows, 'row by row')
       if (allocated(error)) return
       seconds = 1.0_wp
       seconds(30:50) = 9.0_wp
-      forecast = new_forecast(chunks)
+      forecast = new_forecast(chunks, 1)
       call take_all(forecast, seconds, 0, order)
-      call check(error, all(seconds(order(pilot + 1:pilot + 12)) > 1.0_wp), 'dearest first')
+      call check(error, count(seconds(order(pilot + 1:pilot + 12)) > 1.0_wp) >= 11, 'dearest first')
    end subroutine test_chained
 
    !> Equal chunks: what is left, over the ranks, less what has been worked already.
@@ -339,23 +467,24 @@ contains
       integer, parameter :: columns = 20, rows = 10, ranks = 4, done = 100
       real(wp), parameter :: each = 3.0_wp, near = 1.0e-9_wp
       type(forecast_type) :: forecast
-      integer :: order(columns*rows), k
+      type(piece_type) :: pieces(columns*rows)
+      integer :: k
 
-      forecast = new_forecast(tiles(columns, rows, 5, 3))
+      forecast = new_forecast(tiles(columns, rows, 5, 3), ranks)
       do k = 1, ranks
-         call forecast%next(order(k))
+         call forecast%next(pieces(k))
       end do
       do k = 1, done
-         call forecast%next(order(k + ranks))
-         call forecast%note(order(k), each)
+         call forecast%next(pieces(k + ranks))
+         call forecast%note(pieces(k), each)
       end do
       ! Every rank has just told of a chunk, or is half through with the next.
-      call check(error, abs(forecast%remaining(ranks, done*each/ranks) - (columns*rows - done)*each/ranks) < near, 'just begun')
+      call check(error, abs(forecast%remaining(done*each/ranks) - (columns*rows - done)*each/ranks) < near, 'just begun')
       if (allocated(error)) return
-      call check(error, abs(forecast%remaining(ranks, (done/ranks + 0.5_wp)*each) &
+      call check(error, abs(forecast%remaining((done/ranks + 0.5_wp)*each) &
                             - ((columns*rows - done)/ranks - 0.5_wp)*each) < near, 'half through')
       if (allocated(error)) return
-      call check(error, abs(forecast%remaining(ranks, (done/ranks + 90)*each) &
+      call check(error, abs(forecast%remaining((done/ranks + 90)*each) &
                             - ((columns*rows - done)/ranks - 0.5_wp)*each) < near, 'late')
    end subroutine test_remaining
 
@@ -371,11 +500,11 @@ contains
       type(forecast_type) :: forecast
       type(random_stream) :: random
       type(chunk_type), allocatable :: chunks(:)
-      integer, allocatable :: order(:)
-      real(wp), allocatable :: seconds(:)
+      type(piece_type) :: piece
       integer, allocatable :: status(:, :)
-      integer :: k, kind, points
-      real(wp) :: part, expected
+      real(wp), allocatable :: each(:)
+      integer :: none(0), k, kind, points, total
+      real(wp) :: part, spent, expected
 
       case%solver%start = start_static
       allocate (status(speeds, rows))
@@ -383,28 +512,30 @@ contains
       do kind = 1, 2
          status = status_missing
          if (kind == 2) status(:, 1::2) = status_settled
-         chunks = plan_grid(case, status, 16)
-         allocate (order(size(chunks)), seconds(size(chunks)))
+         total = count(status == status_missing)
+         chunks = plan_sweep(case, none, status, ranks)
+         allocate (each(size(chunks)))
          do k = 1, size(chunks)
-            call random%uniform(0.5_wp, 1.5_wp, part)
-            seconds(k) = part*chunks(k)%rows*chunks(k)%count
-            if (chunks(k)%first > 450 .and. chunks(k)%first < 480) seconds(k) = 40.0_wp*seconds(k)
+            call random%uniform(0.5_wp, 1.5_wp, each(k))
+            if (chunks(k)%first > 440 .and. chunks(k)%first < 480) each(k) = 40.0_wp*each(k)
          end do
-         forecast = new_forecast(chunks)
+         forecast = new_forecast(chunks, ranks)
          points = 0
-         do k = 1, size(chunks)
-            call forecast%next(order(k))
-            call forecast%note(order(k), seconds(order(k)))
-            points = points + chunks(order(k))%rows*chunks(order(k))%count
-            if (2*points >= count(status == status_missing)) exit
+         spent = 0.0_wp
+         do while (2*points < total)
+            call forecast%next(piece)
+            k = points_of(part_of(chunks(piece%chunk), piece))
+            call forecast%note(piece, k*each(piece%chunk))
+            spent = spent + k*each(piece%chunk)
+            points = points + k
          end do
-         expected = (sum(seconds) - sum(seconds(order(:k))))/ranks
-         part = forecast%remaining(ranks, sum(seconds(order(:k)))/ranks)
+         expected = (sum(each*points_of(chunks)) - spent)/ranks
+         part = forecast%remaining(spent/ranks)
          call check(error, abs(part - expected) <= tolerance*expected, to_text(part)//' instead of '//to_text(expected))
          if (allocated(error)) return
-         call check(error, sum(seconds(order(:k)))/ranks > 2.0_wp*expected, 'points a second')
+         call check(error, spent/ranks > 2.0_wp*expected, 'points a second')
          if (allocated(error)) return
-         deallocate (order, seconds)
+         deallocate (each)
       end do
    end subroutine test_band
 
@@ -426,7 +557,7 @@ contains
       random = random_stream(71_i8)
       call random%fill(0.0_wp, 1.0_wp, seconds)
       call cpu_time(begun)
-      forecast = new_forecast(tiles(columns, rows, 4, 4))
+      forecast = new_forecast(tiles(columns, rows, 4, 4), 1)
       call take_all(forecast, seconds, 2048, order)
       call cpu_time(ended)
       call check(error, ended - begun < most, 'took '//to_text(ended - begun)//' s')

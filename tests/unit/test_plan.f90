@@ -8,17 +8,21 @@ module test_plan
    use spurflex_io_results_layout, only: variable_type, flexible_variables, width_of
    use spurflex_measure_record, only: observable_of
    use spurflex_measure_response, only: status_diverged, status_missing, status_not_settled, status_settled
-   use spurflex_sweep_plan, only: chunk_type, describe_plan, is_chained, plan_grid, plan_row
+   use spurflex_sweep_chunk, only: chunk_type, part_of, piece_type, points_of
+   use spurflex_sweep_plan, only: describe_plan, is_chained, plan_sweep
    use test_support, only: check, error_type, new_unittest, unittest_type
    implicit none
    private
 
    public :: collect_plan
 
+   !> No rigid support.
+   integer, parameter :: none(0) = [integer ::]
+
    integer, parameter :: done(3) = [status_settled, status_not_settled, status_diverged]
 
-   !> Most points in a chunk that is not chained, and rows of a square tile of so many.
-   integer, parameter :: largest_chunk = 256, tallest_tile = 16
+   !> Most points and rows of a chunk that is not chained.
+   integer, parameter :: largest_chunk = 256, tallest_tile = 8
 
 contains
 
@@ -32,12 +36,13 @@ contains
                   new_unittest('chunks cover the missing points once', test_cover), &
                   new_unittest('no chunk is larger than it may be', test_sizes), &
                   new_unittest('neighbouring missing points make tiles', test_tiles), &
+                  new_unittest('what earlier runs left is not cut further', test_left), &
                   new_unittest('tiles keep to the columns of the file', test_columns), &
                   new_unittest('chained rows are whole', test_rows), &
                   new_unittest('softest support first', test_order), &
-                  new_unittest('the rigid support is row 0', test_rigid), &
+                  new_unittest('the rigid support is row 0 and comes first', test_rigid), &
                   new_unittest('nothing is missing', test_nothing), &
-                  new_unittest('enough chunks for every rank', test_ranks), &
+                  new_unittest('enough pieces for every rank', test_ranks), &
                   new_unittest('what is recorded and what is skipped', test_description) &
                   ]
    end subroutine collect_plan
@@ -127,7 +132,7 @@ contains
          call random%pick(1, 40, ranks)
          call draw(random, speeds, rows, share, status)
          if (mod(i, 3) == 0) call punch(random, status)
-         call check(error, all(covered(plan_grid(case, status, ranks), speeds, rows) &
+         call check(error, all(covered(plan_sweep(case, none, status, ranks), speeds, rows) &
                                == merge(1, 0, status == status_missing)), to_text(speeds)//' speeds, '//to_text(rows) &
                     //' rows, '//to_text(ranks)//' ranks')
          if (allocated(error)) return
@@ -170,7 +175,7 @@ contains
          call random%pick(5, 10, share)
          call random%pick(1, 8, ranks)
          call draw(random, speeds, rows, share, status)
-         associate (chunks => plan_grid(case, status, ranks))
+         associate (chunks => plan_sweep(case, none, status, ranks))
             if (size(chunks) == 0) cycle
             call check(error, maxval(chunks%rows*chunks%count) <= largest_chunk, 'largest chunk')
             if (allocated(error)) return
@@ -197,7 +202,7 @@ contains
          do i = 1, size(speeds)
             allocate (status(speeds(i), rows(k)), source=status_missing)
             do ranks = 1, 17, 4
-               associate (chunks => plan_grid(case, status, ranks))
+               associate (chunks => plan_sweep(case, none, status, ranks))
                   call check(error, all(covered(chunks, speeds(i), rows(k)) == 1), 'cover')
                   if (allocated(error)) return
                   if (size(status) < 8*fewest*ranks) cycle
@@ -235,11 +240,10 @@ contains
       case%solver%start = start_static
       allocate (status(speeds, rows), source=status_missing)
       do ranks = 1, 100
-         associate (chunks => plan_grid(case, status, ranks))
+         associate (chunks => plan_sweep(case, none, status, ranks))
             call check(error, all((chunks%first - 1)/column == (chunks%first + chunks%count - 2)/column), 'borders on ' &
                        //to_text(ranks)//' ranks')
             if (allocated(error)) return
-            if (ranks > 2) cycle
             call check(error, maxval(chunks%count), column, 'width of a large tile')
             if (allocated(error)) return
          end associate
@@ -268,7 +272,7 @@ contains
          call draw(random, speeds, rows, share, status)
          ! Some rows that are missing as a whole, next to each other.
          if (mod(i, 3) == 0) status(:, :rows/2) = status_missing
-         chunks = plan_grid(case, status, ranks)
+         chunks = plan_sweep(case, none, status, ranks)
          call check(error, all(chunks%first == 1 .and. chunks%count == speeds), 'whole rows')
          if (allocated(error)) return
          associate (times => covered(chunks, speeds, rows))
@@ -284,7 +288,7 @@ contains
       end do
    end subroutine test_rows
 
-   !> Rows of rising stiffness, tile by tile: none is begun that is softer than all rows of the tiles under way. Speeds of rising
+   !> Rows of rising stiffness, tile by tile: no tile is begun that is softer than all rows of the tiles under way. Speeds of rising
    !> number within a row.
    subroutine test_order(error)
       !> Why the test failed.
@@ -301,7 +305,7 @@ contains
       case%solver%start = start_rest
       do share = 1, 10
          call draw(random, speeds, rows, share, status)
-         chunks = plan_grid(case, status, 2)
+         chunks = plan_sweep(case, none, status, 2)
          latest = 0
          do c = 1, size(chunks)
             associate (first => chunks(c)%row, last => chunks(c)%row + chunks(c)%rows - 1)
@@ -317,25 +321,60 @@ contains
       end do
    end subroutine test_order
 
-   !> The chunks of the rigid support cover its missing speeds and have no row.
+   !> The chunks of the rigid support cover its missing speeds, have no row and come before all others.
    subroutine test_rigid(error)
       !> Why the test failed.
       type(error_type), allocatable, intent(out) :: error
 
+      integer, parameter :: speeds = 571, rows = 12
       type(case_type) :: case
       type(random_stream) :: random
       type(chunk_type), allocatable :: chunks(:)
-      integer, allocatable :: status(:, :)
+      integer, allocatable :: rigid(:, :), status(:, :)
+      integer :: k
 
       random = random_stream(43_i8)
       case%solver%start = start_static
-      call draw(random, 571, 1, 6, status)
-      chunks = plan_row(case, status(:, 1), 3)
-      call check(error, all(chunks%row == 0), 'row')
+      call draw(random, speeds, 1, 6, rigid)
+      call draw(random, speeds, rows, 6, status)
+      chunks = plan_sweep(case, rigid(:, 1), status, 3)
+      k = count(chunks%row == 0)
+      call check(error, all(chunks(:k)%row == 0), 'rigid ones first')
+      if (allocated(error)) return
+      call check(error, all(covered(chunks(k + 1:), speeds, rows) == merge(1, 0, status == status_missing)), 'flexible')
       if (allocated(error)) return
       chunks%row = 1
-      call check(error, all(covered(chunks, 571, 1) == merge(1, 0, status == status_missing)), 'cover')
+      call check(error, all(covered(chunks(:k), speeds, 1) == merge(1, 0, rigid == status_missing)), 'rigid')
    end subroutine test_rigid
+
+   !> A run that was stopped has left some pieces of tiles: each is a chunk again, and neighbouring halves are one.
+   subroutine test_left(error)
+      !> Why the test failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      integer, parameter :: speeds = 571, rows = 91
+      type(case_type) :: case
+      type(chunk_type), allocatable :: chunks(:), found(:)
+      type(chunk_type) :: part
+      integer, allocatable :: status(:, :)
+      integer :: halvings, c
+
+      case%solver%start = start_static
+      allocate (status(speeds, rows), source=status_missing)
+      chunks = plan_sweep(case, none, status, 1)
+      do halvings = 0, minval(chunks%halvings)
+         status = status_settled
+         do c = 1, size(chunks)
+            part = part_of(chunks(c), piece_type(halvings=halvings, number=mod(5*c, 2**halvings)))
+            status(part%first:part%first + part%count - 1, part%row:part%row + part%rows - 1) = status_missing
+         end do
+         found = plan_sweep(case, none, status, 1)
+         call check(error, size(found), size(chunks), to_text(halvings)//' halvings')
+         if (allocated(error)) return
+         call check(error, all(covered(found, speeds, rows) == merge(1, 0, status == status_missing)), 'cover')
+         if (allocated(error)) return
+      end do
+   end subroutine test_left
 
    !> A complete grid, and one without points, have no chunks.
    subroutine test_nothing(error)
@@ -343,40 +382,44 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       type(case_type) :: case
-      integer :: status(10, 3), none(0, 0), no_speed(0, 3), no_row(10, 0)
+      integer :: status(10, 3), nowhere(0, 0), no_speed(0, 3), no_row(10, 0)
       integer :: start
 
       status = status_settled
       do start = start_rest, start_down
          case%solver%start = start
-         call check(error, size(plan_grid(case, status, 2)), 0, 'complete')
+         call check(error, size(plan_sweep(case, none, status, 2)), 0, 'complete')
          if (allocated(error)) return
-         call check(error, size(plan_row(case, status(:, 1), 2)), 0, 'complete row')
+         call check(error, size(plan_sweep(case, status(:, 1), nowhere, 2)), 0, 'complete row')
          if (allocated(error)) return
-         call check(error, size(plan_grid(case, none, 2)), 0, 'empty')
+         call check(error, size(plan_sweep(case, none, nowhere, 2)), 0, 'empty')
          if (allocated(error)) return
-         call check(error, size(plan_grid(case, no_speed, 2)), 0, 'no speeds')
+         call check(error, size(plan_sweep(case, none, no_speed, 2)), 0, 'no speeds')
          if (allocated(error)) return
-         call check(error, size(plan_grid(case, no_row, 2)), 0, 'no rows')
+         call check(error, size(plan_sweep(case, none, no_row, 2)), 0, 'no rows')
          if (allocated(error)) return
       end do
    end subroutine test_nothing
 
-   !> No chunk holds more than a small part of the work of a rank.
+   !> Every rank finds a piece, and the pieces are not smaller than that needs.
    subroutine test_ranks(error)
       !> Why the test failed.
       type(error_type), allocatable, intent(out) :: error
 
-      integer, parameter :: speeds = 571, rows = 9, part = 8
+      integer, parameter :: speeds = 571, rows = 9, full = 16
       type(case_type) :: case
-      integer :: status(speeds, rows), ranks
+      integer :: status(speeds, rows), ranks, c
 
       case%solver%start = start_static
       status = status_missing
-      do ranks = 1, 64
-         associate (chunks => plan_grid(case, status, ranks))
-            call check(error, part*maxval(chunks%rows*chunks%count) <= speeds*rows/ranks)
+      do ranks = 1, 600, 7
+         associate (chunks => plan_sweep(case, none, status, ranks))
+            call check(error, sum(2**chunks%halvings) >= ranks, to_text(ranks)//' ranks')
             if (allocated(error)) return
+            do c = 1, size(chunks)
+               call check(error, points_of(chunks(c)) >= 2**chunks(c)%halvings*min(full, speeds*rows/(2*ranks)), 'full lanes')
+               if (allocated(error)) return
+            end do
          end associate
       end do
    end subroutine test_ranks
