@@ -1,14 +1,14 @@
-"""Costs of the points of a map, measured in chunks of several sizes.
+"""Costs of the points of a map, measured in pieces of several sizes.
 
-A chunk is a tile of neighbouring speeds and support stiffnesses, and the fewer points are missing, the
-smaller the tiles of the program: the statuses of some tiles of a complete result file are set back to
-`missing`, just so many that the program, run again on one rank, cuts them out as tiles of the size that is
-wanted. It writes each as soon as it is done, its statuses last. Meanwhile the statuses, mapped into memory,
-are watched: which points have appeared, and how long the program has run by then, without the time it
-waited for a processor. Then come the next tiles, until all have been measured.
+A piece is a tile of neighbouring speeds and support stiffnesses, or half of one, or half of that. The
+statuses of one such piece of every tile of a complete result file are set back to `missing`: the program,
+run again on one rank, finds each as a piece of its own. It writes each as soon as it is done, its statuses
+last. Meanwhile the statuses, mapped into memory, are watched: which points have appeared, and how long the
+program has run by then, without the time it waited for a processor. Then comes the next piece of every
+tile, until all have been measured.
 
-A point costs less among others, with which it shares the lanes of the vectors. What a chunk takes is shared
-out to its points as they cost in chunks of one, which are every other point of the grid.
+A point costs less among others, with which it shares the lanes of the vectors. What a piece takes is shared
+out to its points as they cost in pieces of one, which are every other point of the grid.
 """
 
 import os
@@ -22,8 +22,7 @@ import harness
 import numpy as np
 import schedule
 
-ALONE = 1  # points of a chunk of which the tiles of the program are not made
-LENGTHS = (8, 16, 32, 64, 128, 256)  # points that a tile is meant to have
+ALONE = 1  # points of a piece of which no tile is made
 PARTS = ("flexible", "rigid")
 LATE = 2e-4  # s between two looks, after which the watcher was held up
 NANOSECOND = 1e-9  # s
@@ -33,24 +32,14 @@ QUANTILES = (0.01, 0.1, 0.5, 0.9, 0.99, 0.999, 1.0)
 
 @dataclass
 class Costs:
-    """Seconds a point in chunks of some sizes, with writing them: (size, row, speed); rigid: one row."""
+    """Seconds a point, with writing it, by the points of the pieces: (row, speed); rigid: one row."""
 
-    lengths: dict  # points of a chunk: of `flexible` and of `rigid`
-    flexible: np.ndarray
-    rigid: np.ndarray
-
-    def at(self, part, length):
-        """Seconds a point of `flexible` or `rigid` in chunks of a size, (row, speed)."""
-        tables, lengths = getattr(self, part), self.lengths[part]
-        place = np.interp(np.log(length), np.log(lengths), np.arange(len(lengths)))
-        below = max(0, min(int(place), len(lengths) - 2))
-        above = min(below + 1, len(lengths) - 1)
-        return tables[below] + (place - below) * (tables[above] - tables[below])
+    flexible: dict
+    rigid: dict
 
     def least(self, part):
-        """Seconds a point in chunks of the size with the least sum."""
-        tables = getattr(self, part)
-        return tables[int(np.argmin(tables.sum(axis=(1, 2))))]
+        """Seconds a point of `flexible` or `rigid` in pieces of the size with the least sum."""
+        return min(getattr(self, part).values(), key=np.sum)
 
 
 @dataclass
@@ -88,82 +77,83 @@ def measure(program, name, repeats, **values):
     deck, result = program.prepare(name, **values)
     command = [str(program.path), str(deck)]
     at_once = harness.measured(command, 1)
-    tables, lengths, facts = {}, {}, {}
+    tables, facts = {}, {}
     for number, (part, status) in enumerate(zip(PARTS, find_statuses(result), strict=True)):
         run = Watched(command, result, number, status)
-        tables[part], lengths[part], facts[part] = measure_part(run, repeats, part)
-    point = np.concatenate([tables[p][int(np.argmin([t.sum() for t in tables[p]]))] for p in PARTS])
+        tables[part], facts[part] = measure_part(run, repeats, part)
+    costs = Costs(**tables)
+    point = np.concatenate([costs.least(part).ravel() for part in PARTS])
     dearest = np.sort(point)[-max(1, point.size // 100) :]
     report = {
         "points": int(point.size),
-        "processor_seconds_in_chunks_of_the_program": at_once.cpu_seconds,
+        "processor_seconds_in_pieces_of_the_program": at_once.cpu_seconds,
         "by_length": facts,
         "point_seconds_quantiles": {f"{q:g}": float(np.quantile(point, q)) for q in QUANTILES},
         "share_of_the_dearest_percent_of_points": float(dearest.sum() / point.sum()),
     }
-    shapes = dict(zip(PARTS, shapes_of(result), strict=True))
-    return Costs(lengths, *(np.array(tables[p]).reshape(-1, *shapes[p]) for p in PARTS)), report
+    return costs, report
 
 
 def measure_part(run, repeats, part):
-    """Seconds a point in chunks of each size that this grid is large enough for, and what was seen."""
-    random = np.random.default_rng(run.size)
-    tables, facts = [], {}
-    for length in (ALONE, *(n for n in LENGTHS if fits(n, run.shape))):
-        tiles = every_point(run.shape) if length == ALONE else tiles_of(length, run.shape)
-        weight = tables[0] + TINY if tables else np.ones(run.size)
+    """Seconds a point in pieces of each size, and what was seen."""
+    now = schedule.constants_now()
+    # On the rigid support the smallest only: it has too few points for whole runs of large ones.
+    sizes = schedule.sizes_of(run.shape, now) if part == PARTS[0] else {now.smallest_piece: None}
+    tables, facts = {}, {}
+    for length in (ALONE, *sorted(sizes)):
+        pieces = every_point(run.shape) if length == ALONE else pieces_of_tiles(length, run.shape, now)
+        weight = tables[ALONE].ravel() + TINY if tables else np.ones(run.size)
         each = np.full((repeats, run.size), np.nan)
         runs = 0
         for number in range(repeats):
-            singles = sets_of_every_other(run.shape)
-            for blank in singles if length == ALONE else sets_of(length, run.size, tiles, random):
+            sets = sets_of_every_other(run.shape) if length == ALONE else sets_of(length, run.shape, now)
+            for blank in sets:
                 runs += 1
                 points, seconds = shared_out(run.watch(blank), weight)
-                # A tile may appear row by row; one of which a row was not seen counts for nothing.
+                # A piece may appear row by row; one of which a row was not seen counts for nothing.
                 covered = np.bincount(points, minlength=run.size)
-                whole = (np.bincount(tiles, covered) == np.bincount(tiles))[tiles]
-                spent = np.bincount(tiles[points], seconds, minlength=tiles.max() + 1)[tiles]
-                each[number, whole] = (spent * weight / np.bincount(tiles, weight)[tiles])[whole]
+                whole = (np.bincount(pieces, covered) == np.bincount(pieces))[pieces]
+                spent = np.bincount(pieces[points], seconds, minlength=pieces.max() + 1)[pieces]
+                each[number, whole] = (spent * weight / np.bincount(pieces, weight)[pieces])[whole]
         table = median_of(each)
         known = np.isfinite(table)
         # Those that came first in their runs have the start in them: as alone, by what the others save.
         if tables:
-            table[~known] = tables[0][~known] * table[known].sum() / tables[0][known].sum()
+            alone = tables[ALONE].ravel()
+            table[~known] = alone[~known] * table[known].sum() / alone[known].sum()
         else:
             table[~known] = np.median(table[known])
-        tables.append(table)
+        tables[length] = table.reshape(run.shape)
         facts[length] = {
-            "tile": (1, 1) if length == ALONE else schedule.tile(length, run.shape),
+            "size": sizes.get(length),
             "runs": runs,
             "measured_share": float(known.mean()),
             "sum_seconds": float(table.sum()),
         }
-        print(f"{part}, chunks of {length}: {table.sum():.3f} s, {runs} runs", flush=True)
-    return tables, tuple(facts), facts
-
-
-def fits(length, shape):
-    """There are enough points for tiles of this size on one rank."""
-    return least_missing(length) <= int(np.prod(shape))
-
-
-def least_missing(length):
-    """Fewest missing points of which the program on one rank makes tiles of this size."""
-    now = schedule.constants_of_plan()
-    each = now.fewest_chunks if length <= now.smallest_chunk else now.chunks_per_rank
-    return length * each
+        print(f"{part}, pieces of {length}: {table.sum():.3f} s, {runs} runs", flush=True)
+    return tables, facts
 
 
 def every_point(shape):
-    """Tiles of one point."""
+    """Pieces of one point."""
     return np.arange(int(np.prod(shape)))
 
 
-def tiles_of(length, shape):
-    """Number of the tile that each point is in, flat."""
-    height, width = schedule.tile(length, shape)
-    row, speed = np.indices(shape).reshape(2, -1)
-    return row // height * -(-shape[1] // width) + speed // width
+def cuts_of(length, shape, now):
+    """Each tile of a grid, and how often it is halved for pieces of so many points; at the end less often."""
+    halvings = round(np.log2(np.prod(schedule.tile_size(shape, now)) / length))
+    for tile in schedule.tiles_of(shape, now):
+        yield tile, min(halvings, schedule.most_halvings(tile, min(length, now.smallest_piece), now.aspect))
+
+
+def pieces_of_tiles(length, shape, now):
+    """Number of the piece that each point is in, flat."""
+    numbers, next_one = np.zeros(shape, int), 0
+    for tile, halvings in cuts_of(length, shape, now):
+        for number in range(2**halvings):
+            numbers[schedule.part_of(tile, halvings, number, now.aspect).region] = next_one
+            next_one += 1
+    return numbers.ravel()
 
 
 def sets_of_every_other(shape):
@@ -172,30 +162,15 @@ def sets_of_every_other(shape):
     return odd, ~odd
 
 
-def sets_of(length, size, tiles, random):
-    """Sets of tiles, at random, each with so many points that the program cuts it into tiles of this size."""
-    now = schedule.constants_of_plan()
-    sizes = np.bincount(tiles)
-    if length == now.largest_chunk:
-        yield np.full(size, True)
-        return
-    waiting = list(random.permutation(sizes.size))
-    while waiting:
-        # The first point of all, which has the start of the program in it, and whole tiles.
-        chosen, count = [], 1
-        for number in list(waiting):
-            if now.length(count + sizes[number], 1) <= length:
-                chosen.append(number)
-                count += sizes[number]
-                waiting.remove(number)
-            if count >= least_missing(length) and count + sizes.max() > now.chunks_per_rank * (length + 1):
-                break
-        blank = np.isin(tiles, chosen)
-        blank[0] = True
-        # What is still missing to make the tiles as large: points that are measured already, one by one.
-        others = random.permutation(np.flatnonzero(~blank))
-        blank[others[: max(0, least_missing(length) - count)]] = True
-        yield blank
+def sets_of(length, shape, now):
+    """Sets of points, one piece of every tile in each: the first, the second, and so on."""
+    cuts = list(cuts_of(length, shape, now))
+    for number in range(2 ** max(halvings for _, halvings in cuts)):
+        blank = np.zeros(shape, bool)
+        for tile, halvings in cuts:
+            if number < 2**halvings:
+                blank[schedule.part_of(tile, halvings, number, now.aspect).region] = True
+        yield blank.ravel()
 
 
 def shared_out(groups, weight):

@@ -1,9 +1,9 @@
 """Replay of the scheduler on 1 to 1024 ranks with the measured costs of the points of figure 9.
 
-Measures the cost of every point on one rank, spreads the costs to a map of 10^6 points, and replays
-the program's own rule of handing out chunks (schedule.py): rigid twins first, then, when all are
-there, the flexible points; of both a pilot, then what seems dearest. Writes replay.json and
-the figures replay and replay_constants.
+Measures the cost of every point on one rank, in pieces of several sizes, spreads the costs to a map of 10^6
+points, and replays the program's own rule of handing out pieces (schedule.py): the rigid twins, a pilot,
+then what seems dearest, and the smaller the less is left. Writes replay.json and the figures replay and
+replay_constants.
 """
 
 import sys
@@ -17,7 +17,7 @@ from harness import style
 from schedule import Machine
 
 TOLERANCE = 1e-6
-PHASES = ("rigid", "flexible")  # in their order
+PARTS = ("rigid", "flexible")
 RANKS = tuple(2**k for k in range(11))
 GRID, QUICK_GRID = {}, {"speed_count": 115, "stiffness_count": 19}
 FINE, QUICK_FINE = (400, 2500), (40, 250)  # stiffnesses, speeds
@@ -26,9 +26,9 @@ SEED = 20180720
 EFFICIENCY_LIMIT = 0.90  # on 1024 ranks, 10^6 points
 
 # Constants that are tried out, and the numbers of ranks that they must suit.
-LARGEST = tuple(2**k for k in range(3, 8))
-PER_RANK = tuple(2**k for k in range(10))
-TRIED_RANKS = (2, 32, 256, 1024)
+DEAREST = tuple(2**k for k in range(1, 7))
+LARGEST = tuple(2**k for k in range(1, 8))
+TRIED_RANKS = (4, 16, 64, 256)
 
 
 def refined(tables, shape, random):
@@ -37,143 +37,145 @@ def refined(tables, shape, random):
     Drawn, the nearer one more often, and not averaged: averages would hide the dear points among cheap ones.
     """
     places = []
-    for old, new in zip(tables.shape[1:], shape, strict=True):
+    for old, new in zip(schedule.shape_of(tables), shape, strict=True):
         at = np.linspace(0.0, old - 1.0, new)
         below = np.clip(at.astype(int), 0, max(old - 2, 0))
         places.append((below, at - below))
     (row, row_part), (speed, speed_part) = places
     rows = row[:, None] + (random.random(shape) < row_part[:, None])
     columns = speed[None, :] + (random.random(shape) < speed_part[None, :])
-    return tables[:, rows, columns]
+    return {length: table[rows, columns] for length, table in tables.items()}
+
+
+class Told(schedule.Forecast):
+    """A forecast that is told before what a point of each tile costs in the mean."""
+
+    def __init__(self, work, ranks):
+        super().__init__(work, ranks)
+        self.first = work.ahead  # no pilot
+        self.known = self.timed = 1
+
+    def rates(self):
+        """The costs themselves."""
+        work = self.work
+        rest = range(work.ahead, len(work.chunks))
+        return np.array([work.cost(c, work.chunks[c]) for c in rest]) / work.points[work.ahead :]
 
 
 class Map:
     """A map whose sweep is replayed."""
 
-    def __init__(self, name, measured, machine):
-        self.name, self.costs, self.machine = name, measured, machine
-        self.sizes = {part: measured.least(part).size for part in PHASES}
-        self.pieces = [
-            schedule.pieces_of(
-                dict(zip(measured.lengths[part], getattr(measured, part), strict=True)), machine.write
-            )
-            for part in PHASES
-        ]
+    def __init__(self, name, measured, machine, now):
+        self.name, self.costs, self.machine, self.now = name, measured, machine, now
+        self.size = sum(measured.least(part).size for part in PARTS)
         self.known = {}
+        grid = schedule.shape_of(measured.flexible)
+        sizes = {costs.ALONE: (1, 1), **schedule.sizes_of(grid, now)}
+        row = {length: (1, length) for length in measured.rigid}
+        self.pieces = [
+            # How large the pieces are in which they are written is not known: at no cost.
+            schedule.pieces_of(measured.rigid, row, 0.0),
+            schedule.pieces_of(measured.flexible, sizes, machine.write),
+        ]
 
-    def chunks(self, part, length):
-        """Costs of the chunks of one phase, in order."""
-        return schedule.cut(self.costs.at(part, length), length)
-
-    def lengths(self, constants, ranks):
-        """Points of a chunk in each phase."""
-        return {part: constants.length(size, ranks) for part, size in self.sizes.items()}
-
-    def phase(self, part, length, ranks):
-        """Seconds of one phase with chunks of a length."""
-        if (part, length, ranks) not in self.known:
-            chunks = self.chunks(part, length)
-            order = schedule.forecast(length, self.costs.least(part).shape)
-            self.known[part, length, ranks] = schedule.replay(chunks, ranks, self.machine, order)
-        return self.known[part, length, ranks]
+    def work(self, constants):
+        """The map, cut by these constants."""
+        return schedule.Work(self.costs.flexible, self.costs.rigid, constants)
 
     def seconds(self, constants, ranks):
-        """Seconds of both phases: the second begins when all ranks have done the first."""
-        # In between the rigid twins go to all ranks.
-        gather = 2.0 * self.machine.latency * float(np.ceil(np.log2(ranks)))
-        lengths = self.lengths(constants, ranks)
-        rigid, flexible = (self.phase(part, lengths[part], ranks) for part in PHASES)
-        return rigid + gather, flexible
+        """Seconds of the whole sweep, and how many pieces it was."""
+        if (constants, ranks) not in self.known:
+            forecast = self.work(constants).on(ranks)
+            self.known[constants, ranks] = schedule.replay(forecast, ranks, self.machine), forecast.pieces
+        return self.known[constants, ranks]
 
     def bound(self, ranks):
         """No schedule is done earlier [s]: the work is shared evenly, but no point is divided."""
-        return sum(schedule.lower_bound(self.costs.least(part), ranks) for part in PHASES)
+        return schedule.lower_bound(np.concatenate([self.costs.least(p).ravel() for p in PARTS]), ranks)
 
-    def tile_bounds(self, ranks):
-        """No schedule of tiles is done earlier [s], even if it knew all costs and cut each tile best.
-
-        Of one in which the flexible points wait for the rigid twins, as they do, and of one in which not.
-        """
-        waiting = sum(schedule.tile_bound([pieces], ranks) for pieces in self.pieces)
-        return waiting, schedule.tile_bound(self.pieces, ranks)
+    def tile_bound(self, ranks):
+        """No schedule of tiles is done earlier [s], even if it knew all costs and cut each tile best."""
+        return schedule.tile_bound(self.pieces, ranks)
 
     def of_bound(self, constants, ranks):
         """The least possible time over that of all ranks together; what is lost is lost to the schedule."""
-        return self.bound(ranks) / sum(self.seconds(constants, ranks))
+        return self.bound(ranks) / self.seconds(constants, ranks)[0]
 
-    def what_if(self, constants, ranks):
+    def what_if(self, ranks):
         """Efficiencies of other rules on so many ranks."""
-        lengths = self.lengths(constants, ranks)
-        rigid, flexible = (self.chunks(part, lengths[part]) for part in PHASES)
-        singles = (self.chunks(part, 1) for part in PHASES)
+        work = self.work(self.now)
+        whole = [work.cost(c, chunk) for c, chunk in enumerate(work.chunks)]
+        small = []
+        for c, chunk in enumerate(work.chunks):
+            halvings = schedule.most_halvings(chunk, self.now.smallest_piece, self.now.aspect)
+            parts = (schedule.part_of(chunk, halvings, k, self.now.aspect) for k in range(2**halvings))
+            small += [work.cost(c, part) for part in parts]
+        single = np.concatenate([getattr(self.costs, part)[costs.ALONE].ravel() for part in PARTS])
         rules = {
-            "softest support first": (rigid, flexible),
-            "dearest chunk first, as if known before": tuple(np.sort(c)[::-1] for c in (rigid, flexible)),
-            "dearest point first, chunks of one": tuple(np.sort(c)[::-1] for c in singles),
-            "the same, flexible points do not wait for the rigid twins": (
-                np.sort(np.concatenate([rigid, flexible]))[::-1],
-            ),
+            "whole tiles, softest support first": whole,
+            "whole tiles, dearest first, as if known before": sorted(whole, reverse=True),
+            "smallest pieces, softest support first": small,
+            "smallest pieces, dearest first, as if known before": sorted(small, reverse=True),
+            "single points, dearest first, as if known before": np.sort(single)[::-1],
         }
-        one = sum(self.seconds(constants, 1))
+        rules = {name: schedule.InOrder(rule) for name, rule in rules.items()}
+        # Who knows what is dear need not cut as much.
+        for dearest in (2, 4, self.now.dearest_part):
+            told = Told(self.work(replace(self.now, dearest_part=dearest)), ranks)
+            rules[f"as it is, the mean cost of each tile known before, dearest_part {dearest}"] = told
+        one = self.seconds(self.now, 1)[0]
         return {
-            name: one / (ranks * sum(schedule.replay(phase, ranks, self.machine) for phase in phases))
-            for name, phases in rules.items()
+            name: one / (ranks * schedule.replay(rule, ranks, self.machine)) for name, rule in rules.items()
         }
 
-    def report(self, constants, all_ranks):
+    def report(self, all_ranks):
         """The replay with the constants as they are."""
-        alone = dict(zip(PHASES, self.seconds(constants, 1), strict=True))
-        one = sum(alone.values())
+        one = self.seconds(self.now, 1)[0]
         lines = []
         for ranks in all_ranks:
-            rigid, flexible = self.seconds(constants, ranks)
-            lengths = self.lengths(constants, ranks)
-            chunks = self.chunks("flexible", lengths["flexible"])
-            tiles, tiles_at_once = self.tile_bounds(ranks)
+            seconds, pieces = self.seconds(self.now, ranks)
             lines.append(
                 {
                     "ranks": ranks,
-                    "chunk_length": lengths,
-                    "tile": schedule.tile(lengths["flexible"], self.costs.flexible.shape[1:]),
-                    "chunks": int(chunks.size),
-                    "cost_of_small_chunks": float(chunks.sum()) / alone["flexible"],
-                    "rigid_seconds": rigid,
-                    "flexible_seconds": flexible,
-                    "seconds": rigid + flexible,
-                    "efficiency": one / (ranks * (rigid + flexible)),
-                    "efficiency_of_the_flexible_points": alone["flexible"] / (ranks * flexible),
+                    "pieces": pieces,
+                    "points_of_the_smallest": self.now.fewest(self.size, ranks),
+                    "seconds": seconds,
+                    "efficiency": one / (ranks * seconds),
                     "best_efficiency_of_any_schedule": min(1.0, one / (ranks * self.bound(ranks))),
-                    "best_efficiency_of_any_tiles": min(1.0, one / (ranks * tiles)),
-                    "the_same_if_none_waits_for_the_twins": min(1.0, one / (ranks * tiles_at_once)),
-                    "dearest_chunk_seconds": float(chunks.max()),
-                    "seconds_per_rank_if_shared_evenly": float(chunks.sum()) / ranks,
+                    "best_efficiency_of_any_tiles": min(1.0, one / (ranks * self.tile_bound(ranks))),
                 }
             )
         return {
-            "points": sum(self.sizes.values()),
+            "points": self.size,
             "seconds_on_one_rank": one,
-            "dearest_point_seconds": {part: float(self.costs.least(part).max()) for part in PHASES},
+            "dearest_smallest_piece_seconds": float(self.pieces[1][1][1].max()),
+            "dearest_point_seconds": {
+                part: float(getattr(self.costs, part)[costs.ALONE].max()) for part in PARTS
+            },
             "ranks": lines,
-            "other_rules": {"ranks": all_ranks[-1], "efficiency": self.what_if(constants, all_ranks[-1])},
+            "other_rules": {str(ranks): self.what_if(ranks) for ranks in all_ranks[-5::2]},
         }
 
 
 def try_constants(maps, all_ranks, now):
-    """How near to the best possible time other constants come; the best first: where it is least, most.
-
-    `largest_chunk` up to the one for which costs were measured.
-    """
+    """How near to the best possible time other constants come; the best in the mean first."""
     tried = []
-    for largest in sorted({*LARGEST, now.largest_chunk}):
-        for per_rank in sorted({*PER_RANK, now.chunks_per_rank}):
-            constants = replace(now, largest_chunk=largest, chunks_per_rank=per_rank)
+    for dearest in sorted({*DEAREST, now.dearest_part}):
+        for largest in sorted({*LARGEST, now.largest_part}):
+            constants = replace(now, dearest_part=dearest, largest_part=largest)
             each = {m.name: {n: m.of_bound(constants, n) for n in all_ranks} for m in maps}
             values = [value for by_ranks in each.values() for value in by_ranks.values()]
             tried.append(
-                {**asdict(constants), "least": min(values), "mean": float(np.mean(values)), "of_bound": each}
+                {
+                    "dearest_part": dearest,
+                    "largest_part": largest,
+                    "least": min(values),
+                    "mean": float(np.mean(values)),
+                    "of_bound": each,
+                }
             )
-        print(f"constants: largest_chunk {largest} tried", flush=True)
-    return sorted(tried, key=lambda t: (-round(t["least"], 3), -round(t["mean"], 3), -t["largest_chunk"]))
+        print(f"constants: dearest_part {dearest} tried", flush=True)
+    return sorted(tried, key=lambda t: -round(t["mean"], 3))
 
 
 def plot_efficiency(reports, options):
@@ -197,21 +199,21 @@ def plot_efficiency(reports, options):
 def plot_constants(tried, now, options):
     """How near to the best possible time, over both constants."""
     drawn, axes = harness.figure()
-    largest = sorted({t["largest_chunk"] for t in tried})
-    per_rank = sorted({t["chunks_per_rank"] for t in tried})
-    least = np.full((len(largest), len(per_rank)), np.nan)
+    dearest = sorted({t["dearest_part"] for t in tried})
+    largest = sorted({t["largest_part"] for t in tried})
+    mean = np.full((len(dearest), len(largest)), np.nan)
     for t in tried:
-        least[largest.index(t["largest_chunk"]), per_rank.index(t["chunks_per_rank"])] = 100.0 * t["least"]
-    shown = axes.imshow(least, origin="lower", aspect="auto", vmin=0.0, vmax=100.0, cmap=style.SEQUENTIAL)
-    here = per_rank.index(now.chunks_per_rank), largest.index(now.largest_chunk)
+        mean[dearest.index(t["dearest_part"]), largest.index(t["largest_part"])] = 100.0 * t["mean"]
+    shown = axes.imshow(mean, origin="lower", aspect="auto", cmap=style.SEQUENTIAL)
+    here = largest.index(now.largest_part), dearest.index(now.dearest_part)
     axes.plot(*here, "x", color=style.VERMILION, ms=7, mew=1.5, label="as they are")
-    best = per_rank.index(tried[0]["chunks_per_rank"]), largest.index(tried[0]["largest_chunk"])
+    best = largest.index(tried[0]["largest_part"]), dearest.index(tried[0]["dearest_part"])
     axes.plot(*best, "o", mfc="none", color=style.VERMILION, ms=8, mew=1.5, label="best")
-    axes.set_xticks(range(len(per_rank)), per_rank)
-    axes.set_yticks(range(len(largest)), largest)
-    axes.set(xlabel="chunks_per_rank [1]", ylabel="largest_chunk [points]")
+    axes.set_xticks(range(len(largest)), largest)
+    axes.set_yticks(range(len(dearest)), dearest)
+    axes.set(xlabel="largest_part [1]", ylabel="dearest_part [1]")
     drawn.legend(loc="outside upper center", ncols=2)
-    drawn.colorbar(shown, label="least possible time over replayed time [%]")
+    drawn.colorbar(shown, label="least possible time over replayed time, mean [%]")
     harness.save(drawn, options, "replay_constants")
 
 
@@ -222,7 +224,7 @@ def main(argv=None):
     helps = {
         "latency": "of a message, one way",
         "service": "of rank 0 for a request",
-        "write": "to write a chunk, beside what it takes here",
+        "write": "to write a piece, beside what it takes here",
     }
     for name, text in helps.items():
         value = getattr(default, name)
@@ -230,7 +232,7 @@ def main(argv=None):
     options = harness.prepare(parser.parse_args(argv))
     if options.quick:
         options.repeats = 1
-    now = schedule.constants_of_plan()
+    now = schedule.constants_now()
 
     program = harness.Program(options.build, options.out / "runs")
     grid = QUICK_GRID if options.quick else GRID
@@ -243,11 +245,11 @@ def main(argv=None):
     shape = QUICK_FINE if options.quick else FINE
     flexible = refined(measured.flexible, shape, random)
     rigid = refined(measured.rigid, (1, shape[1]), random)
-    fine = costs.Costs(measured.lengths, flexible, rigid)
+    fine = costs.Costs(flexible, rigid)
     machine = replace(default, latency=options.latency, service=options.service, write=options.write)
     title = f"{shape[0] * shape[1]:,} points".replace(",", "\u2009")
-    maps = [Map("map of figure 9", measured, machine), Map(title, fine, machine)]
-    reports = {m.name: m.report(now, RANKS) for m in maps}
+    maps = [Map("map of figure 9", measured, machine, now), Map(title, fine, machine, now)]
+    reports = {m.name: m.report(RANKS) for m in maps}
     for name, report in reports.items():
         line = report["ranks"][-1]
         share, most = (100.0 * line[k] for k in ("efficiency", "best_efficiency_of_any_tiles"))
@@ -268,7 +270,7 @@ def main(argv=None):
         "check_on_two_ranks": {
             "program_seconds": two_ranks.program_seconds,
             "others_share": two_ranks.others_share,
-            "replayed_seconds": sum(maps[0].seconds(now, 2)),
+            "replayed_seconds": maps[0].seconds(now, 2)[0],
         },
         "not_replayed": [
             "start of MPI, reading the deck, creating and opening the file",
@@ -282,8 +284,9 @@ def main(argv=None):
     harness.write(options, "replay", report)
     best = tried[0]
     print(
-        f"largest_chunk {now.largest_chunk}, chunks_per_rank {now.chunks_per_rank} now; best would be "
-        f"{best['largest_chunk']}, {best['chunks_per_rank']}: {100 * best['least']:.1f} % of what is possible"
+        f"dearest_part {now.dearest_part}, largest_part {now.largest_part} now; best would be "
+        f"{best['dearest_part']}, {best['largest_part']}: {100 * best['mean']:.1f} % of what is possible, "
+        "in the mean"
     )
     plot_efficiency(reports, options)
     plot_constants(tried, now, options)
