@@ -24,7 +24,7 @@ module spurflex_sweep_forecast
    !> It should take at most this part of the time that is left; a single rank need not cut at all ...
    integer, parameter :: dearest_part = 8
    !> ... unless that takes longer [s]: what is in hand is lost with a run that is killed, and waited for by one that is asked to
-   !> stop. Of what nothing is known it is the time that points of all kinds have taken.
+   !> stop. As long as no time of the grid is known, a point counts as the mean of those that went ahead.
    real(wp), parameter :: longest_piece = 5.0_wp
    !> Less than any point takes [s].
    real(wp), parameter :: shortest_point = 1.0e-9_wp
@@ -52,7 +52,7 @@ module spurflex_sweep_forecast
       integer :: first = 0, passed = 0
       !> How much of each chunk is handed out, in its smallest pieces; points of it that are not, and that are at work.
       integer, allocatable :: given(:), left(:), out(:)
-      !> Points of all chunks that are handed out, and of which the time is known.
+      !> Points that are handed out, and, but for those that go ahead, of which the time is known.
       integer :: handed_out = 0, known = 0
       !> What a point of each chunk is expected to take [s].
       real(wp), allocatable :: expected(:)
