@@ -152,11 +152,12 @@ def test_signal(root, run, program, mpiexec, whole, tmp_path):
 
 @pytest.mark.parametrize("start", ["static", "up"])
 def test_signal_to_one_rank(root, run, program, mpiexec, tmp_path, start):
-    """The others hear of it, also while one of them has the whole rigid row; the file is as if nothing was."""
+    """The others hear of it, even while one of them has all of the rigid row; the file is the same."""
     needs_open_mpi(mpiexec)
     grid = {"rows": 48, "speeds": 120, "start": start}
     undisturbed = map_deck(root, tmp_path / "whole", **grid)
-    assert run(undisturbed, ranks=2, folder=undisturbed.parent, environment=EPOCH).returncode == EXIT_COMPLETE
+    done = run(undisturbed, ranks=2, folder=undisturbed.parent, environment=EPOCH)
+    assert done.returncode == EXIT_COMPLETE, done.stderr
     folder = tmp_path / "drained"
     deck = map_deck(root, folder, **grid)
     with Job(program, mpiexec, deck, ranks=3, folder=folder) as job:
