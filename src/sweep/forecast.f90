@@ -49,7 +49,7 @@ module spurflex_sweep_forecast
       !> Chunks in the order in which they are handed out, first those that go ahead and the pilot; how many are done with: those of
       !> the pilot when a piece of them is handed out, others when all is.
       integer, allocatable :: order(:)
-      integer :: first = 0, passed = 0
+      integer :: passed = 0
       !> How much of each chunk is handed out, in its smallest pieces; points of it that are not, and that are at work.
       integer, allocatable :: given(:), left(:), out(:)
       !> Points that are handed out, and, but for those that go ahead, of which the time is known.
@@ -119,7 +119,6 @@ contains
          end associate
       end do
       self%order = [self%order, pack(rest, in_pilot)]
-      self%first = size(self%order)
    end function new_forecast
 
    !> Divide the extent of all chunks in one direction into bins.
@@ -156,7 +155,7 @@ contains
       integer :: chunk, points
 
       if (self%is_exhausted()) return
-      if (self%passed == self%first .and. .not. self%is_ordered) call revise(self)
+      if (self%passed == size(self%order) .and. .not. self%is_ordered) call revise(self)
       chunk = self%order(self%passed + 1)
       call cut(self, chunk, piece)
       points = points_of(part_of(self%chunks(chunk), piece))
@@ -255,7 +254,7 @@ contains
       real(wp), allocatable :: rate(:, :)
       integer :: c
 
-      self%is_ordered = self%passed >= self%first .or. self%is_ordered
+      self%is_ordered = self%is_ordered .or. self%passed == size(self%order)
       self%next_revision = self%known + merge(self%known/revision_share, self%known, self%is_ordered) + 1
       if (self%known > 0) then
          rate = rates(self%seconds, self%counted)

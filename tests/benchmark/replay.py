@@ -52,7 +52,7 @@ class Told(schedule.Forecast):
 
     def __init__(self, work, ranks):
         super().__init__(work, ranks)
-        self.first = work.ahead  # no pilot
+        del self.order[work.ahead :]  # no pilot
         self.known = self.timed = 1
 
     def rates(self):

@@ -242,7 +242,6 @@ class Forecast:
         row, speed = np.indices(self.shape)
         in_pilot = ((speed + now.pilot_skew * row) % now.pilot_share == 0).reshape(-1)
         self.order = [*range(work.ahead), *(work.ahead + np.flatnonzero(in_pilot)).tolist()]
-        self.first = len(self.order)
         self.passed = self.known = self.pieces = 0
         self.ordered = False
         fewest = now.fewest(int(work.points.sum()), ranks)
@@ -263,7 +262,7 @@ class Forecast:
 
     def next(self):
         """The next piece to hand out; None if none is left."""
-        if self.passed == self.first and not self.ordered:
+        if self.passed == len(self.order) and not self.ordered:
             self.revise()
         if self.passed == len(self.order):
             return None
@@ -318,7 +317,7 @@ class Forecast:
 
     def revise(self):
         """Expect other times; once the pilot is handed out, put in order what is left."""
-        self.ordered = self.passed >= self.first or self.ordered
+        self.ordered = self.ordered or self.passed == len(self.order)
         step = self.known // self.now.revision_share if self.ordered else self.known
         self.next_revision = self.known + step + 1
         if self.known:
